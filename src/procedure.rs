@@ -12,6 +12,7 @@ pub(crate) mod cell;
 pub(crate) mod checks;
 pub mod circles;
 pub mod compare;
+pub mod correct;
 pub mod dangers;
 pub mod deliver;
 mod error;

@@ -93,6 +93,21 @@ impl Dialect {
             .map(|(_, dialect)| dialect)
     }
 
+    /// The language that the ending of a file name tells.
+    pub fn of_file(name: &str) -> Option<Self> {
+        let ending = name.rsplit_once('.')?.1.to_ascii_lowercase();
+        match ending.as_str() {
+            "mod" | "modx" | "prg" | "sys" => Some(Self::Rapid),
+            "src" | "dat" | "sub" => Some(Self::Krl),
+            "ls" => Some(Self::Fanuc),
+            "script" | "urp" => Some(Self::Urscript),
+            "dtx" | "pgx" => Some(Self::Val3),
+            "jbi" => Some(Self::Inform),
+            "yaml" | "yml" | "json" => Some(Self::Ros),
+            _ => None,
+        }
+    }
+
     /// The table of languages.
     const fn language(self) -> &'static Language {
         match self {

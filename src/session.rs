@@ -13,6 +13,7 @@ pub mod advice;
 pub mod calibration;
 pub mod comparison;
 pub mod constraints;
+pub mod corrected;
 pub mod export;
 pub mod filter;
 pub mod health;

@@ -39,6 +39,7 @@ use std::collections::VecDeque;
 
 use jiff::Timestamp;
 
+pub use crate::procedure::correct::check as check_program;
 pub use effect::{
     Answer, CircleConfigurations, Effect, Event, JointCheckStop, NamedPoint, Request, RequestId, RequestProgress,
     StoreEvent,

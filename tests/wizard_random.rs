@@ -14,10 +14,12 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use trupose::kinematics::ForwardKinematics;
+use trupose::procedure::correct::ProgramFile;
 use trupose::procedure::identify::identify;
 use trupose::procedure::models::models;
 use trupose::profile::{Profile, builtin};
 use trupose::session::about::About;
+use trupose::session::corrected::{CorrectedText, Points, ProgramChoice};
 use trupose::session::journal::Line;
 use trupose::session::plan::{PlannedPose, PoseKind};
 use trupose::session::reading::{MeasureRequest, Reading};
@@ -204,6 +206,12 @@ impl Cell {
                 smr: self.text(),
                 ..About::default()
             })),
+            Intent::CorrectProgram(_) => Intent::CorrectProgram(Box::new(ProgramChoice {
+                file: self.text() + ".mod",
+                points: Points::ALL[self.pick(3)],
+                tool: self.text(),
+                ..ProgramChoice::default()
+            })),
             Intent::SuggestPoses(_) => Intent::SuggestPoses([0, 1, 3, usize::MAX][self.pick(4)]),
             other => other,
         }
@@ -269,6 +277,15 @@ impl Cell {
                     CircleConfigurations { joint: joints - 2, configurations: self.circle(joints, joints - 2) },
                 ])
             }
+            Request::Correct(request) => Answer::Corrected(Box::new(ProgramFile {
+                summary: CorrectedText {
+                    source: request.choice.file.clone(),
+                    file: self.text(),
+                    ..CorrectedText::default()
+                },
+                bytes: vec![0xff],
+            })),
+            Request::WriteCorrected(program) => Answer::CorrectedWritten(Box::new(program.summary.clone())),
             Request::Program { .. } => {
                 Answer::Programmed { files: vec![("calposes.src".to_owned(), self.text())], dangers: Vec::new() }
             }
@@ -462,10 +479,10 @@ impl Cell {
 fn every_intent() -> Vec<Intent> {
     use Intent::{
         About, AcceptPlan, AcceptReading, ApplyRemedy, Back, Cancel, ChooseInstrument, ChooseProfile, ChooseTarget,
-        Deliver, DiscardCircles, DiscardJointCheck, Dismiss, DropPoints, Exclude, GoToPose, Identify, Include, Keep,
-        LeaveOut, LoadPlan, MakePlan, Measure, MeasureAgain, NameSession, Next, Note, NotePose, PlanFromRecording,
-        Quit, ReadPoints, Redo, Retry, ShowPoints, Skip, StartCircles, StartJointCheck, SuggestPoses, TakeAllPoints,
-        TakePoints, TypeReading, Undo, UseCircles,
+        CorrectProgram, Deliver, DiscardCircles, DiscardJointCheck, Dismiss, DropPoints, Exclude, GoToPose, Identify,
+        Include, Keep, LeaveOut, LoadPlan, MakePlan, Measure, MeasureAgain, NameSession, Next, Note, NotePose,
+        PlanFromRecording, Quit, ReadPoints, Redo, Retry, ShowPoints, Skip, StartCircles, StartJointCheck,
+        SuggestPoses, TakeAllPoints, TakePoints, TypeReading, Undo, UseCircles,
     };
     vec![
         Next,
@@ -511,6 +528,7 @@ fn every_intent() -> Vec<Intent> {
         Identify,
         About(Box::default()),
         Deliver,
+        CorrectProgram(Box::default()),
     ]
 }
 

@@ -52,12 +52,18 @@ pub struct InsertedPoint {
     pub posture: Option<Posture>,
 }
 
-/// Whether points can be put into programs of this language at all.
-pub fn can_insert(dialect: Dialect) -> bool {
+/// Why no points can be put into programs of a language; `None` if they can.
+pub const fn cannot_insert(dialect: Dialect) -> Option<&'static str> {
     match dialect {
-        Dialect::Rapid | Dialect::Krl | Dialect::Urscript => true,
-        // Their points are in lists with numbers, or in another file.
-        Dialect::Fanuc | Dialect::Val3 | Dialect::Inform | Dialect::Ros => false,
+        Dialect::Rapid | Dialect::Krl | Dialect::Urscript => None,
+        Dialect::Fanuc => {
+            Some("its points have numbers, and a program may compute the number of a point that it uses or writes")
+        }
+        Dialect::Val3 => Some("its points are in another file, whose arrays would change their size"),
+        Dialect::Inform => {
+            Some("its points have numbers in the order of the list, and other jobs and the pendant know them by number")
+        }
+        Dialect::Ros => Some("each of its points has a time, and the times of new ones belong to the planner"),
     }
 }
 

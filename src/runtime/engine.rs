@@ -357,6 +357,7 @@ impl Engine {
             Request::Measure(request) => self.link.measure(id, request, flag),
             Request::Turn { at_mm } => self.link.turn(id, from_xyz_mm(at_mm), flag),
             Request::Deliver { files, left_out } => self.store.ask(Command::Replace { id, files, left_out }),
+            Request::WriteCorrected(program) => self.store.ask(Command::Program { id, program }),
             request => jobs::start(id, request, flag, self.sender.clone()),
         };
         if !is_started {

@@ -12,8 +12,10 @@ use jiff::tz::TimeZone;
 
 use super::events::Events;
 use crate::procedure;
+use crate::procedure::correct::{CorrectError, CorrectRequest, several};
 use crate::procedure::joint_check::Stop;
 use crate::profile::{Profile, builtin, builtin_names};
+use crate::program::motion::Companion;
 use crate::program::{self, Dialect};
 use crate::session::measurements::{self, Expected};
 use crate::session::plan::{self, PlannedPose};
@@ -31,6 +33,7 @@ pub(super) fn start(id: RequestId, request: Request, cancelled: Arc<AtomicBool>,
         Request::Plan { .. } => "plan",
         Request::Identify(_) => "identify",
         Request::Model(_) => "model",
+        Request::Correct(_) => "correct",
         _ => "read",
     };
     let work = move || {
@@ -68,10 +71,13 @@ impl Job {
             Request::ReadPoints { file, profile, unit } => points(file, &profile, unit),
             Request::Identify(request) => self.identify(&request),
             Request::Model(request) => Ok(Answer::Modelled(Box::new(procedure::models::models(&request)))),
+            Request::Correct(request) => correct(&request),
             // Other threads carry these out.
-            Request::Connect { .. } | Request::Measure(_) | Request::Turn { .. } | Request::Deliver { .. } => {
-                Ok(Answer::Cancelled)
-            }
+            Request::Connect { .. }
+            | Request::Measure(_)
+            | Request::Turn { .. }
+            | Request::Deliver { .. }
+            | Request::WriteCorrected(_) => Ok(Answer::Cancelled),
         };
         match answer {
             Ok(answer) if is_search || !self.is_cancelled() => answer,
@@ -128,6 +134,25 @@ fn load_plan(file: &str, profile: &Profile) -> Result<Answer, Problem> {
     let listed =
         plan::read(&text, file, &procedure::joint_types(profile)).map_err(|errors| Problem::new(errors.to_string()))?;
     Ok(Answer::Planned { summary: None, rows: listed.rows, origin: format!("the poses of '{file}'") })
+}
+
+/// Corrects a program with its companions.
+fn correct(request: &CorrectRequest) -> Result<Answer, Problem> {
+    let read = |file: &str| store::read(Path::new(file)).map_err(|error| Problem::new(causes(&error)));
+    let companion = |file: &str| -> Result<Companion, Problem> {
+        let name = Path::new(file).file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        Ok(Companion { name, text: read(file)? })
+    };
+    let file = read(&request.choice.file)?;
+    let companions = several(&request.choice.companions).map(companion).collect::<Result<_, Problem>>()?;
+    match procedure::correct::correct(request, file, companions) {
+        Ok(program) => Ok(Answer::Corrected(Box::new(program))),
+        Err(error @ CorrectError::Torn { .. }) => {
+            let problem = Problem::new(format!("{error}; nothing is written"));
+            Err(problem.hint("state what is missing: the tool, the frame, the files that belong to the program"))
+        }
+        Err(error) => Err(Problem::new(causes(&error))),
+    }
 }
 
 /// The robot program of a plan.

@@ -7,6 +7,7 @@ use std::thread::{self, JoinHandle};
 
 use super::events::Events;
 use crate::checksum;
+use crate::procedure::correct::{FOLDER, ProgramFile};
 use crate::session::journal::{Entry, Line};
 use crate::store;
 use crate::store::session::{SessionError, SessionFolder};
@@ -24,6 +25,7 @@ pub(super) enum Command {
     Create { id: RequestId, name: String },
     Append { id: RequestId, lines: Vec<Line> },
     Replace { id: RequestId, files: Vec<(String, String)>, left_out: Vec<String> },
+    Program { id: RequestId, program: Box<ProgramFile> },
 }
 
 /// The store thread with its channel.
@@ -89,6 +91,7 @@ fn work(root: &Path, mut held: Option<SessionFolder>, commands: &Receiver<Comman
             Command::Replace { id, files, left_out } => {
                 Event::Answer { id, answer: replace(held.as_ref(), &files, left_out) }
             }
+            Command::Program { id, program } => Event::Answer { id, answer: write_program(held.as_ref(), *program) },
         };
         if !events.send(event) {
             break;
@@ -117,6 +120,27 @@ fn replace(held: Option<&SessionFolder>, files: &[(String, String)], left_out: V
             sums: files.iter().map(|(_, text)| checksum::sum(text)).collect(),
             left_out,
         },
+        Err(error) => Answer::Failed(Problem::unwritten(causes(&error))),
+    }
+}
+
+/// Writes a corrected program, unless that would replace the program itself.
+fn write_program(held: Option<&SessionFolder>, program: ProgramFile) -> Answer {
+    let Some(folder) = held else {
+        return Answer::Failed(Problem::unwritten("the session has no folder"));
+    };
+    let ProgramFile { summary, bytes } = program;
+    let path = folder.path().join(&summary.file);
+    let source = Path::new(&summary.source).canonicalize();
+    if source.is_ok_and(|source| path.canonicalize().is_ok_and(|path| path == source)) {
+        let problem = Problem::new(format!("'{}' is corrected already", summary.source));
+        return Answer::Failed(
+            problem.hint("give the program as it was: corrected targets must not be corrected a second time"),
+        );
+    }
+    let written = store::create_folder(&folder.path().join(FOLDER)).and_then(|()| store::replace_bytes(&path, &bytes));
+    match written {
+        Ok(()) => Answer::CorrectedWritten(Box::new(summary)),
         Err(error) => Answer::Failed(Problem::unwritten(causes(&error))),
     }
 }

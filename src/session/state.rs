@@ -17,6 +17,7 @@ use thiserror::Error;
 
 use super::about::About;
 use super::calibration::{MountedText, mounted_on};
+use super::corrected::CorrectedText;
 use super::journal::{
     CirclePointText, Decision, Entry, FindingText, IdentifiedText, JointCheckPointText, Journal, Line, MeasuredText,
     PlanText, PlannedText, RobotProgramText, from_edge, from_xyz_mm, to_xyz_mm,
@@ -103,6 +104,8 @@ pub struct Session {
     pub delivered_sums: Vec<String>,
     /// Models that were left out of them, with the reason.
     pub left_out: Vec<String>,
+    /// Robot programs that were corrected with the result, the latest of each file.
+    pub corrected: Vec<CorrectedText>,
     /// Number of times it was resumed.
     pub resumed: usize,
     /// Whether it ended normally.
@@ -382,11 +385,16 @@ impl Session {
                 // Files of an earlier result are not those of this one.
                 self.delivered.clear();
                 self.left_out.clear();
+                self.corrected.clear();
             }
             Entry::Delivered { files, left_out, sums } => {
                 self.delivered.clone_from(files);
                 self.delivered_sums.clone_from(sums);
                 self.left_out.clone_from(left_out);
+            }
+            Entry::Corrected(program) => {
+                self.corrected.retain(|other| other.file != program.file);
+                self.corrected.push(program.clone());
             }
             Entry::Resumed { .. } => {
                 self.resumed += 1;

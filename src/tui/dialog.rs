@@ -2,6 +2,7 @@
 
 pub mod ask;
 mod cell;
+mod correct;
 mod form;
 pub mod links;
 mod place;
@@ -93,6 +94,7 @@ impl Dialog {
             Intent::TypeReading(_) => Some(ask::coordinates(view, "")),
             Intent::StatePayload(payload) => Some(ask::payload(payload)),
             Intent::About(about) => Some(ask::about(about)),
+            Intent::CorrectProgram(_) => Some(correct::program()),
             Intent::DescribeCell(cell) => Some(cell::cell(cell)),
             Intent::DescribeRobot(sheet) => Some(cell::data_sheet(sheet)),
             Intent::PlaceTracker(points) => Some(place::tracker(points)).map(|dialog| dialog.seeing(view)),

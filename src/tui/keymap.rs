@@ -106,7 +106,7 @@ const fn offer(c: char, rank: u8, accepts: fn(&Intent) -> bool) -> Binding {
 pub const BELL: Key = Key::ctrl('b');
 
 /// The table. Of several bindings with the same key, the first one whose intent is possible applies.
-const BINDINGS: [Binding; 66] = [
+const BINDINGS: [Binding; 67] = [
     bind(Key::plain_code(KeyCode::Enter), 0, Target::Default),
     bind(Key::plain_code(KeyCode::Esc), 1, Target::Offer(|intent| matches!(intent, Intent::Cancel))),
     bind(Key::plain_code(KeyCode::Esc), 4, Target::Offer(|intent| matches!(intent, Intent::Dismiss))),
@@ -168,6 +168,7 @@ const BINDINGS: [Binding; 66] = [
     offer('e', 7, |intent| matches!(intent, Intent::SuggestPoses(_))),
     offer('i', 3, |intent| matches!(intent, Intent::Identify)),
     offer('d', 3, |intent| matches!(intent, Intent::Deliver)),
+    offer('p', 4, |intent| matches!(intent, Intent::CorrectProgram(_))),
     offer('a', 5, |intent| matches!(intent, Intent::About(_))),
     bind(Key::plain_code(KeyCode::F(1)), 9, Target::Local(LocalAction::Help, "help")),
     bind(Key::ctrl('z'), 9, Target::Local(LocalAction::Suspend, "suspend; 'fg' resumes")),

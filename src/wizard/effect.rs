@@ -8,10 +8,12 @@ use super::notice::{Notice, Problem};
 use super::view::SessionCard;
 use crate::identification::Stage;
 use crate::procedure;
+use crate::procedure::correct::{CorrectRequest, ProgramFile};
 use crate::procedure::identify::{Identified, IdentifyRequest};
 use crate::procedure::models::{Models, ModelsRequest};
 use crate::procedure::plan::PlanRequest;
 use crate::profile::{CellText, Profile};
+use crate::session::corrected::CorrectedText;
 use crate::session::journal::Line;
 use crate::session::plan::PlannedPose;
 use crate::session::plan_summary::PlanSummary;
@@ -119,6 +121,10 @@ pub enum Answer {
     Identified(Box<Identified>),
     /// The models are written and verified, in memory.
     Modelled(Box<Models>),
+    /// A robot program is corrected and verified, in memory.
+    Corrected(Box<ProgramFile>),
+    /// The corrected program is on disk.
+    CorrectedWritten(Box<CorrectedText>),
     /// The robot program of a plan is made, in memory.
     Programmed {
         /// Name and text of each file.
@@ -253,6 +259,10 @@ pub enum Request {
     Identify(Box<IdentifyRequest>),
     /// Write the identified arm in other formats, and verify each.
     Model(Box<ModelsRequest>),
+    /// Correct a robot program.
+    Correct(Box<CorrectRequest>),
+    /// Write a corrected program into the session folder.
+    WriteCorrected(Box<ProgramFile>),
     /// Replace the result files in the session folder.
     Deliver {
         /// Name and text of each file.
@@ -278,6 +288,8 @@ impl Request {
             Self::ReadPoints { .. } => "reading the points",
             Self::Identify(_) => "identifying",
             Self::Model(_) => "writing and checking the models",
+            Self::Correct(_) => "correcting the program",
+            Self::WriteCorrected(_) => "writing the corrected program",
             Self::Deliver { .. } => "writing files",
         }
     }

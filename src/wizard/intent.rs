@@ -6,6 +6,7 @@ use crate::procedure::plan::{INTERACTIVE_CANDIDATES, PlanRequest};
 use crate::profile::datasheet::Datasheet;
 use crate::profile::{BoxText, CellText};
 use crate::session::about::About;
+use crate::session::corrected::ProgramChoice;
 use crate::session::set_up::{
     FacePair, InstrumentChoice, JointLimitsText, PayloadText, ProgramText, TargetChoice, TrackerPoints,
 };
@@ -136,6 +137,8 @@ pub enum Intent {
     About(Box<About>),
     /// Write the result files.
     Deliver,
+    /// Correct a robot program with the result.
+    CorrectProgram(Box<ProgramChoice>),
 }
 
 impl Intent {
@@ -202,6 +205,7 @@ impl Intent {
             Self::Identify => "Identify",
             Self::About(_) => "About",
             Self::Deliver => "Deliver",
+            Self::CorrectProgram(_) => "CorrectProgram",
         }
     }
 }

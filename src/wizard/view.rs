@@ -16,6 +16,7 @@ use crate::planning::{Figures, Stage};
 use crate::procedure::plan;
 use crate::profile::{Level, Profile};
 use crate::session::about::About;
+use crate::session::corrected::CorrectedText;
 use crate::session::journal::{FindingCause, PlanText};
 use crate::session::plan::PoseKind;
 use crate::session::plan_summary::PlanSummary;
@@ -596,6 +597,9 @@ pub struct DeliverView {
     pub is_current: bool,
     /// Serial number, operator and place for the report.
     pub about: About,
+    /// Robot programs that were corrected with the result.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub corrected: Vec<CorrectedText>,
 }
 
 /// Builds the view of a wizard.

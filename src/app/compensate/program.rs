@@ -31,11 +31,14 @@ pub(super) fn run<O: Write, E: Write>(
     dialect: Dialect,
     console: &mut Console<O, E>,
 ) -> Result<ExitStatus, Failure> {
-    if args.insert.is_some() && !insert::can_insert(dialect) {
-        return Err(Failure::new(ExitStatus::Usage, format!("points cannot be inserted into {dialect} programs"))
-            .hint(
-                "'--insert' is for RAPID, KRL and URScript; without it the path between the targets is only judged",
-            ));
+    if args.insert.is_some()
+        && let Some(reason) = insert::cannot_insert(dialect)
+    {
+        return Err(Failure::new(
+            ExitStatus::Usage,
+            format!("points cannot be inserted into {dialect} programs: {reason}"),
+        )
+        .hint("'--insert' is for RAPID, KRL and URScript; without it the path between the targets is only judged"));
     }
     let files = args.program.iter().chain(&args.companion).map(|path| {
         let file = store::read(path).map_err(|error| Failure::from_error(ExitStatus::Usage, &error))?;

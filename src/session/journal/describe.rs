@@ -65,6 +65,7 @@ impl Entry {
             Self::Delivered { files, left_out, .. } => {
                 format!("written: {}; left out: {}", files.join(", "), left_out.join("; "))
             }
+            Self::Corrected(program) => format!("program corrected: {}", program.line()),
             Self::Resumed { program, torn_bytes: 0 } => format!("resumed by {program}"),
             Self::Resumed { program, torn_bytes } => {
                 format!("resumed by {program}; {torn_bytes} bytes of an incomplete last entry dropped")

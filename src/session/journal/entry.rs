@@ -9,6 +9,7 @@ use crate::planning::Figures;
 use crate::profile::CellText;
 use crate::session::about::About;
 use crate::session::calibration::Calibration;
+use crate::session::corrected::CorrectedText;
 use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::plan_summary::PlanSummary;
 use crate::session::set_up::{InstrumentChoice, PayloadText, ProgramText, Step, TargetChoice};
@@ -138,6 +139,8 @@ pub enum Entry {
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         sums: Vec<String>,
     },
+    /// A robot program was corrected with the result.
+    Corrected(CorrectedText),
     /// The session was resumed.
     Resumed {
         program: String,

@@ -13,6 +13,7 @@ use crate::procedure::identify::{IdentifyRequest, NamedSample, identify};
 use crate::profile::cell_text::InstrumentText;
 use crate::profile::{CellText, Profile, builtin};
 use crate::session::about::About;
+use crate::session::corrected::CorrectedText;
 use crate::session::measurements;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{
@@ -288,6 +289,16 @@ fn all_entries() -> Vec<Entry> {
             left_out: vec![TRICKY.to_owned()],
             sums: vec!["00ff".to_owned()],
         },
+        Entry::Corrected(CorrectedText {
+            source: TRICKY.to_owned(),
+            file: TRICKY.to_owned(),
+            corrected: 3,
+            left: 1,
+            reasons: vec![TRICKY.to_owned()],
+            largest_mm: Some(1.25),
+            uncertainty_mm: None,
+            path_mm: Some(0.1),
+        }),
         Entry::Resumed { program: "trupose 9".to_owned(), torn_bytes: usize::MAX },
         Entry::Closed { reason: TRICKY.to_owned() },
         Entry::Connected { identity: TRICKY.to_owned() },
@@ -348,6 +359,7 @@ fn variant(entry: &Entry) -> usize {
         Entry::Redone { .. } => 29,
         Entry::JointCheckPoint(_) => 30,
         Entry::JointCheckDiscarded => 31,
+        Entry::Corrected(_) => 32,
     }
 }
 
@@ -355,7 +367,7 @@ fn variant(entry: &Entry) -> usize {
 fn every_entry_comes_back_as_it_was() {
     let lines = lines(all_entries());
     let variants: std::collections::BTreeSet<usize> = lines.iter().map(|line| variant(&line.entry)).collect();
-    assert_eq!(variants.len(), 32);
+    assert_eq!(variants.len(), 33);
     let (text, starts) = text(&lines);
     let journal = read(&text).unwrap();
     for (read, written) in journal.lines.iter().zip(&lines) {

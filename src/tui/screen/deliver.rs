@@ -98,6 +98,7 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
         if !content.left_out.is_empty() {
             page.paragraph("'trupose export --help' lists what can be done about it.", Role::Plain);
         }
+        corrected(content, &path, &mut page);
         next_steps(content, &path, folder, &mut page);
         page.title("Files");
         for file in &content.files {
@@ -113,6 +114,21 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
     page
 }
 
+/// The robot programs that were corrected, and what stays in them.
+fn corrected(content: &DeliverView, path: &dyn Fn(&str) -> String, page: &mut Page) {
+    if content.corrected.is_empty() {
+        return;
+    }
+    page.title("Corrected programs");
+    for program in &content.corrected {
+        let whole = crate::session::corrected::CorrectedText { file: path(&program.file), ..program.clone() };
+        page.marked(("- ", Role::Dim), &whole.line(), Role::Ok);
+        for reason in &program.reasons {
+            page.marked(("    left: ", Role::Dim), reason, Role::Plain);
+        }
+    }
+}
+
 /// How to apply the result, pass it on and check it later, with commands to copy.
 fn next_steps(content: &DeliverView, path: &dyn Fn(&str) -> String, folder: &str, page: &mut Page) {
     page.title("What to do next");
@@ -121,7 +137,7 @@ fn next_steps(content: &DeliverView, path: &dyn Fn(&str) -> String, folder: &str
     let mut steps = Vec::new();
     if is_accepted {
         steps.push((
-            "correct a robot program whose points were computed, not taught, so that the arm goes where it says:",
+            "correct a robot program whose points were computed, not taught (key p), so that the arm goes where it says:",
             format!(
                 "trupose compensate --calibration {calibration} --program FILE --dialect krl --points computed --out NEW-FILE"
             ),

@@ -358,6 +358,7 @@ fn deliver(files: &[&str]) -> ViewModel {
         verdict: Some(Box::new(verdict(VerdictStatus::Accepted))),
         is_current: true,
         about: About { serial: "R-17".to_owned(), ..About::default() },
+        corrected: Vec::new(),
     });
     let deliver = IntentInfo::new(Intent::Deliver, "write the files");
     view(Step::Deliver, content, vec![if files.is_empty() { deliver.default_action() } else { deliver }])

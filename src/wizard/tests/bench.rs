@@ -8,6 +8,7 @@ use jiff::{SignedDuration, Timestamp};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::kinematics::{ForwardKinematics, KinematicChain, LinkParameter, ParameterId};
+use crate::procedure;
 use crate::procedure::identify::identify;
 use crate::procedure::models::models;
 use crate::profile::{Profile, builtin};
@@ -23,6 +24,9 @@ use crate::wizard::{
     Answer, CircleConfigurations, Effect, Event, Intent, JointCheckStop, NamedPoint, PlanSettings, Problem, Request,
     RequestId, StoreEvent, ViewModel, Wizard,
 };
+
+/// A robot program, whatever its file is called.
+const PROGRAM: &str = "MODULE M\n  PROC main()\n    MoveAbsJ [[10,20,-20,10,40,5],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n  ENDPROC\nENDMODULE\n";
 
 /// Identification poses of the plan.
 pub(super) const IDENTIFICATION: usize = 14;
@@ -171,6 +175,13 @@ pub(super) fn answer(request: &Request) -> Answer {
             Err(error) => failure(&error.to_string()),
         },
         Request::Model(request) => Answer::Modelled(Box::new(models(request))),
+        Request::Correct(request) => {
+            match procedure::correct::correct(request, PROGRAM.as_bytes().to_vec(), Vec::new()) {
+                Ok(program) => Answer::Corrected(Box::new(program)),
+                Err(error) => failure(&error.to_string()),
+            }
+        }
+        Request::WriteCorrected(program) => Answer::CorrectedWritten(Box::new(program.summary.clone())),
         Request::Deliver { files, left_out } => {
             let files = files.iter().map(|(name, _)| name.clone()).collect();
             Answer::Delivered { files, sums: Vec::new(), left_out: left_out.clone() }

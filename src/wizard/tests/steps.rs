@@ -2,6 +2,7 @@
 
 use super::bench::{Bench, FOLDER, IDENTIFICATION, MANUAL, MEASURED, VERIFICATION, blocked, offers, started, texts};
 use crate::procedure::models::Models;
+use crate::session::corrected::{Points, ProgramChoice};
 use crate::session::journal::Entry;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, RecordedSet, Step, TargetChoice};
@@ -294,7 +295,7 @@ fn identify_verify_and_deliver_end_in_files() {
     assert!(mean(&verification.identified) < 0.2 * mean(&verification.nominal));
     assert_eq!(offers(&bench.wizard), ["Next*", "Back", "DescribeCell", "Quit"]);
     bench.does(Intent::Next);
-    assert_eq!(offers(&bench.wizard), ["Deliver*", "About", "Back", "Quit"]);
+    assert_eq!(offers(&bench.wizard), ["Deliver*", "CorrectProgram", "About", "Back", "Quit"]);
     let effects = bench.intend(Intent::Deliver);
     assert_eq!(texts(&effects), ["start writing and checking the models"]);
     bench.settle(effects);
@@ -467,4 +468,26 @@ fn an_accepted_plan_is_written_beside_the_journal() {
     bench.does(Intent::SuggestPoses(2));
     assert!(bench.wizard.session().rows.len() > rows);
     assert!(bench.told().starts_with("the plan is saved"));
+}
+
+#[test]
+fn a_program_is_corrected_written_and_noted() {
+    let mut bench = Bench::at(Step::Deliver);
+    let choice = |points: Points| {
+        let choice = ProgramChoice { file: "cell/pick.mod".to_owned(), points, ..ProgramChoice::default() };
+        Intent::CorrectProgram(Box::new(choice))
+    };
+    assert!(bench.intend(choice(Points::NotStated)).is_empty());
+    assert!(bench.told().contains("computed or taught?"), "{}", bench.told());
+    assert!(bench.intend(choice(Points::Taught)).is_empty());
+    assert!(bench.told().contains("taught points are not corrected"), "{}", bench.told());
+    let effects = bench.intend(choice(Points::Computed));
+    assert_eq!(texts(&effects), ["start correcting the program"]);
+    bench.settle(effects);
+    let [program] = bench.wizard.session().corrected.as_slice() else { panic!("{}", bench.told()) };
+    assert_eq!((program.file.as_str(), program.corrected, program.left), ("corrected/pick.mod", 1, 0));
+    assert!(program.largest_mm.unwrap() > 0.1 && program.largest_mm.unwrap() < 20.0, "{program:?}");
+    assert!(bench.told().contains("1 target corrected, 0 left"), "{}", bench.told());
+    let Content::Deliver(view) = bench.wizard.view().content else { panic!() };
+    assert_eq!(view.corrected.len(), 1);
 }
