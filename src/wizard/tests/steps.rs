@@ -6,6 +6,7 @@ use crate::session::corrected::{Points, ProgramChoice};
 use crate::session::journal::Entry;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, RecordedSet, Step, TargetChoice};
+use crate::session::summary::VerdictStatus;
 use crate::wizard::view::{Content, SessionCard};
 use crate::wizard::{Activity, Answer, Event, Intent, PlanSettings, Request, Severity};
 
@@ -295,7 +296,7 @@ fn identify_verify_and_deliver_end_in_files() {
     assert!(mean(&verification.identified) < 0.2 * mean(&verification.nominal));
     assert_eq!(offers(&bench.wizard), ["Next*", "Back", "DescribeCell", "Quit"]);
     bench.does(Intent::Next);
-    assert_eq!(offers(&bench.wizard), ["Deliver*", "CorrectProgram", "About", "Back", "Quit"]);
+    assert_eq!(offers(&bench.wizard), ["Deliver*", REFUSED, "About", "Back", "Quit"]);
     let effects = bench.intend(Intent::Deliver);
     assert_eq!(texts(&effects), ["start writing and checking the models"]);
     bench.settle(effects);
@@ -470,9 +471,13 @@ fn an_accepted_plan_is_written_beside_the_journal() {
     assert!(bench.told().starts_with("the plan is saved"));
 }
 
+/// The offer to correct a program with a result that is not accepted.
+const REFUSED: &str = "CorrectProgram -- the result is not accepted: see the step Verify";
+
 #[test]
 fn a_program_is_corrected_written_and_noted() {
     let mut bench = Bench::at(Step::Deliver);
+    bench.wizard.session.identified.as_mut().unwrap().summary.verdict.status = VerdictStatus::Accepted;
     let choice = |points: Points| {
         let choice = ProgramChoice { file: "cell/pick.mod".to_owned(), points, ..ProgramChoice::default() };
         Intent::CorrectProgram(Box::new(choice))
