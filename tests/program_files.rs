@@ -222,6 +222,20 @@ fn settings_of_the_controller_stay() {
 }
 
 #[test]
+fn scripts_and_programs_keep_what_they_compute_or_pass_on() {
+    let lines = |scan: &Scan| {
+        let targets: Vec<usize> = scan.targets.iter().map(|target| target.line).collect();
+        (targets, scan.left.iter().map(|left| left.line).collect::<Vec<usize>>())
+    };
+    let text = fs::read(folder().join("field/u02_oldpolyscope.script")).unwrap();
+    let scan = found(Dialect::Urscript, "ur5e", &text, Vec::new());
+    assert_eq!(lines(&scan), (vec![3, 5, 6, 7, 9, 11, 14, 16, 22, 24, 25], vec![18, 20, 23, 28]), "{scan:?}");
+    let text = fs::read(folder().join("field/v04_prog.pgx")).unwrap();
+    let scan = found(Dialect::Val3, STAUBLI, &text, vec![companion("field/v01_omitted.dtx")]);
+    assert_eq!(lines(&scan), (vec![6], vec![5, 7, 8, 9]), "{scan:?}");
+}
+
+#[test]
 #[expect(clippy::float_cmp, reason = "a number that is read as it was written")]
 fn polyscope_states_pose_tool_and_branch() {
     let text = fs::read(folder().join("field/u01_polyscope.script")).unwrap();
