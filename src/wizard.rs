@@ -41,8 +41,7 @@ use jiff::Timestamp;
 
 pub use crate::procedure::correct::check as check_program;
 pub use effect::{
-    Answer, CircleConfigurations, Effect, Event, JointCheckStop, NamedPoint, Request, RequestId, RequestProgress,
-    StoreEvent,
+    Answer, CircleConfigurations, Effect, Event, JointCheckStop, Request, RequestId, RequestProgress, StoreEvent,
 };
 pub use intent::{Danger, Intent, IntentInfo, PlanSettings};
 pub use notice::{Notice, Problem, Severity};

@@ -217,7 +217,9 @@ fn every_module_keeps_to_its_layer() {
             continue;
         };
         for used in used_modules(shipped(&text)) {
-            if used != top && used != "text" && !allowed.contains(&used.as_str()) {
+            // Macros of `text` are at the root of the library.
+            let is_macro = used.is_empty() && top == "text";
+            if !is_macro && used != top && used != "text" && !allowed.contains(&used.as_str()) {
                 wrong.push(format!("{}: '{top}' must not know '{used}'", path.display()));
             }
         }

@@ -689,8 +689,8 @@ fn a_session_is_shown_in_a_few_lines() {
     }
     // One that was interrupted, with notes, a skipped pose, and a torn end.
     let place = Place::new();
-    let deeds = ["Do(Note(\"draught from the gate\"))", "Do(Skip)", "Capture(3, Fail)", "Do(Undo)"];
-    place.pause(&deeds).until_measured(3).kill();
+    let actions = ["Do(Note(\"draught from the gate\"))", "Do(Skip)", "Capture(3, Fail)", "Do(Undo)"];
+    place.pause(&actions).until_measured(3).kill();
     let path = place.session().join("journal.ron");
     // The kill may come before or after the undo is on disk: it is cut off.
     let bytes = fs::read(&path).unwrap();

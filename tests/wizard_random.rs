@@ -21,6 +21,7 @@ use trupose::profile::{Profile, builtin};
 use trupose::session::about::About;
 use trupose::session::corrected::{CorrectedText, Points, ProgramChoice};
 use trupose::session::journal::Line;
+use trupose::session::measurements::NamedPoint;
 use trupose::session::plan::{PlannedPose, PoseKind};
 use trupose::session::reading::{MeasureRequest, Reading};
 use trupose::session::set_up::{CoordinateUnit, InstrumentChoice, TargetChoice};
@@ -28,8 +29,8 @@ use trupose::session::simulation::Simulation;
 use trupose::session::state::Session;
 use trupose::units::{DEGREE, MICROMETRE, MILLIMETRE};
 use trupose::wizard::{
-    Answer, CircleConfigurations, Effect, Event, Intent, JointCheckStop, NamedPoint, PlanSettings, Problem, Request,
-    RequestId, RequestProgress, StoreEvent, Wizard,
+    Answer, CircleConfigurations, Effect, Event, Intent, JointCheckStop, PlanSettings, Problem, Request, RequestId,
+    RequestProgress, StoreEvent, Wizard,
 };
 
 /// Streams of events, where `TRUPOSE_WIZARD_SEEDS` does not ask for more.

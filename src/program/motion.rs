@@ -37,7 +37,6 @@ pub struct Target {
 
 /// What a target asks for.
 #[derive(Clone, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "most targets are poses")]
 pub enum Goal {
     /// Pendant configuration (rad), sliding joints (m).
     Joints(Vec<f64>),

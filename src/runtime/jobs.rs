@@ -24,7 +24,7 @@ use crate::session::workbook;
 use crate::store;
 use crate::text::causes;
 use crate::wizard::{
-    self, Answer, CircleConfigurations, Event, JointCheckStop, NamedPoint, Problem, Request, RequestId, RequestProgress,
+    self, Answer, CircleConfigurations, Event, JointCheckStop, Problem, Request, RequestId, RequestProgress,
 };
 
 /// Starts a request. Returns `false` if the system refuses a thread.
@@ -194,9 +194,8 @@ fn points(file: String, profile: &Profile, unit: CoordinateUnit) -> Result<Answe
         bytes
     };
     let joints = procedure::joint_types(profile);
-    let named = |(name, point)| NamedPoint { name, point };
     let points = match measurements::points_alone(&Expected::of(profile, &joints), unit.sign(), &text, &file) {
-        Ok(points) => points.into_iter().map(named).collect(),
+        Ok(points) => points,
         Err(errors) => wizard::reading::parse_named(&String::from_utf8_lossy(&text), unit).map_err(|_not_lines| {
             Problem::new(errors.to_string()).hint(format!(
                 "a table needs titles such as 'pose, x_mm, y_mm, z_mm'; without titles, write one point per line: name x y z in {}",

@@ -36,7 +36,7 @@ use nalgebra::Point3;
 pub use columns::{Columns, ColumnsError, Units};
 pub(super) use consistency::farthest_joint;
 pub use foreign::{ColumnRead, Expected, Reading, Understood};
-pub use join::{JoinBy, PointFile, joined, points_alone};
+pub use join::{JoinBy, NamedPoint, PointFile, joined, points_alone};
 pub use layout::Layout;
 pub use saved::SavedLayout;
 pub(super) use writer::{joint_cells, quoted};

@@ -6,9 +6,9 @@
 
 mod correction;
 mod history;
+mod sample;
 
 use std::collections::BTreeSet;
-use std::fmt;
 
 use jiff::Timestamp;
 use nalgebra::Point3;
@@ -29,8 +29,9 @@ use crate::profile::{CellText, Profile};
 use crate::units::from_mm;
 pub use correction::Corrected;
 use correction::is_factor;
-pub use history::Deed;
 use history::History;
+pub use history::Undoable;
+pub use sample::{Sample, SampleState, Stop};
 
 /// A longer time between two entries (s) is a break, or a clock that was set.
 const LONGEST_STEP: f64 = 3600.0;
@@ -153,59 +154,6 @@ impl Row {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SampleState {
-    Counts,
-    /// Replaced by a later measurement of the same row.
-    Superseded,
-    /// The operator excluded it.
-    LeftOut,
-    /// It was taken by mistake.
-    Undone,
-}
-
-impl fmt::Display for SampleState {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Counts => "counts",
-            Self::Superseded => "remeasured",
-            Self::LeftOut => "excluded",
-            Self::Undone => "undone",
-        })
-    }
-}
-
-/// A stop of the arm.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Stop {
-    /// Where this measurement was taken.
-    Sample(u64),
-    /// A configuration that the operator has driven through.
-    Passed {
-        pose: String,
-        /// Pendant values (rad, m).
-        configuration: Vec<f64>,
-    },
-}
-
-/// A measured point.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Sample {
-    /// The record in the journal.
-    pub noted: MeasuredText,
-    pub time: Timestamp,
-    /// Row of the plan that it belongs to now.
-    pub row: usize,
-    /// Configuration of the robot, pendant values at the edge (deg, mm).
-    pub joints: Vec<f64>,
-    /// State of the row.
-    pub state: SampleState,
-    /// Whether the operator kept it in spite of a finding.
-    pub kept: bool,
-    /// Number of the last measurement when it was corrected: findings up to then are settled. 0: never.
-    pub settled: u64,
-}
-
 /// A measurement that gave no sample, or whose sample does not count, with the reason.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Refused {
@@ -269,18 +217,19 @@ impl Session {
     /// # Errors
     /// The entry does not fit; the session is then unchanged.
     pub fn apply(&mut self, line: &Line) -> Result<(), FoldError> {
-        match &line.entry {
-            Entry::Undone { line: undone, .. } => self.undo(line, *undone)?,
-            Entry::Redone { line: redone, .. } => self.redo(line, *redone)?,
-            _ => {
-                self.apply_once(line)?;
-                self.remember(line);
-            }
+        if let Entry::Undone { line: undone, .. } = &line.entry {
+            return self.undo(line, *undone);
         }
+        if let Entry::Redone { line: redone, .. } = &line.entry {
+            return self.redo(line, *redone);
+        }
+        self.apply_once(line)?;
+        self.remember(line);
         Ok(())
     }
 
     /// Applies a line that neither undoes nor redoes another one.
+    #[expect(clippy::too_many_lines, reason = "an arm for each kind of entry")]
     fn apply_once(&mut self, line: &Line) -> Result<(), FoldError> {
         let misfit = |what: &str| FoldError::Misfit { line: line.number, what: what.to_owned() };
         match &line.entry {

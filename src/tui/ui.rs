@@ -16,7 +16,7 @@ use crate::session::set_up::Step;
 use crate::session::state::Session;
 use crate::units::{DEGREE, MILLIMETRE};
 use crate::wizard::Intent;
-use crate::wizard::view::{Content, JointShown, TargetView, ViewModel};
+use crate::wizard::view::{Content, JointShown, ViewModel};
 
 /// Rows of a screen below a dialog that are worth showing.
 const FEWEST_BELOW: u16 = 8;
@@ -320,13 +320,13 @@ fn scene(view: &ViewModel, session: &Session) -> Option<Scene> {
                 None => scene,
             })
         }
-        Content::Target(TargetView { joint_check: Some(check), .. }) if !check.joints.is_empty() => {
-            at_joints(session, &check.joints)
+        Content::Target(content) => {
+            let check = content.joint_check.as_ref().map(|check| &check.joints);
+            let circles = content.circles.as_ref().map(|circles| &circles.joints);
+            let shown = check.into_iter().chain(circles).find(|joints| !joints.is_empty());
+            shown.map_or_else(|| Scene::of_session(session, None), |joints| at_joints(session, joints))
         }
-        Content::Target(TargetView { circles: Some(circles), .. }) if !circles.joints.is_empty() => {
-            at_joints(session, &circles.joints)
-        }
-        Content::Instrument(_) | Content::Target(_) => Scene::of_session(session, None),
+        Content::Instrument(_) => Scene::of_session(session, None),
         Content::Capture(content) => Scene::of_session(session, content.row),
         Content::Identify(_) => Scene::of_identified(session, false),
         Content::Verify(_) => Scene::of_identified(session, true),

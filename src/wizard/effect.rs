@@ -1,7 +1,6 @@
 //! Inputs of the wizard ([`Event`]) and the work that it asks for ([`Effect`]).
 
 use jiff::Timestamp;
-use nalgebra::Point3;
 
 use super::intent::Intent;
 use super::notice::{Notice, Problem};
@@ -15,6 +14,7 @@ use crate::procedure::plan::PlanRequest;
 use crate::profile::{CellText, Profile};
 use crate::session::corrected::CorrectedText;
 use crate::session::journal::Line;
+use crate::session::measurements::NamedPoint;
 use crate::session::plan::PlannedPose;
 use crate::session::plan_summary::PlanSummary;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
@@ -152,15 +152,6 @@ pub struct CircleConfigurations {
     pub joint: usize,
     /// Pendant values (rad, sliding joints m), in order.
     pub configurations: Vec<Vec<f64>>,
-}
-
-/// A point of a table, with the name that it has there.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NamedPoint {
-    /// Name of the point or its pose, if it has one.
-    pub name: Option<String>,
-    /// In the tracker frame (m).
-    pub point: Point3<f64>,
 }
 
 /// A stop of the joint check.

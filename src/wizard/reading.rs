@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::effect::NamedPoint;
+use crate::session::measurements::NamedPoint;
 use crate::session::reading::Reading;
 use crate::session::set_up::CoordinateUnit;
 use crate::text::{counted, printable, shortened};

@@ -162,7 +162,7 @@ pub enum Content {
     /// Choice of the instrument.
     Instrument(InstrumentView),
     /// Position of the SMR on the flange.
-    Target(TargetView),
+    Target(Box<TargetView>),
     /// Choice of the poses.
     Plan(PlanView),
     /// Measurement.

@@ -191,6 +191,7 @@ fn identified() -> IdentifiedText {
 }
 
 /// Entries of every variant, with every variant of what they hold.
+#[expect(clippy::too_many_lines, reason = "one of each")]
 fn all_entries() -> Vec<Entry> {
     let recorded = |layout: &str, rows: Option<&str>| RecordedSet {
         file: TRICKY.to_owned(),

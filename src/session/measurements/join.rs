@@ -92,6 +92,15 @@ pub fn joined(
     read_understood(Ok(whole), reading.1, expected, &names.join("' and '"), Vec::new(), Vec::new())
 }
 
+/// A point of a table, with the name that it has there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedPoint {
+    /// Name of the point or its pose, if it has one.
+    pub name: Option<String>,
+    /// In the tracker frame (m).
+    pub point: Point3<f64>,
+}
+
 /// Reads a file with points alone, each with its name if the file has names. Coordinates whose columns state no unit are in `unit`.
 ///
 /// # Errors
@@ -101,7 +110,7 @@ pub fn points_alone(
     unit: &str,
     content: &[u8],
     file: &str,
-) -> Result<Vec<(Option<String>, Point3<f64>)>, TableErrors> {
+) -> Result<Vec<NamedPoint>, TableErrors> {
     let units = format!("deg,{unit}").parse().unwrap_or_default();
     let reading = Reading { units, ..Reading::default() };
     let part = part(expected, &reading, file, content, Wanted::Points)?;
@@ -115,7 +124,7 @@ pub fn points_alone(
     let name = |row: usize| names.as_ref()?.get(row).filter(|name| !name.is_empty()).map(|name| (*name).to_owned());
     let point = |row: usize| {
         let at = |axis: usize| coordinates.get(axis)?.get(row).copied();
-        Some((name(row), Point3::new(at(0)?, at(1)?, at(2)?)))
+        Some(NamedPoint { name: name(row), point: Point3::new(at(0)?, at(1)?, at(2)?) })
     };
     Ok((0..part.foreign.records.len()).filter_map(point).collect())
 }

@@ -22,7 +22,7 @@ pub(super) struct History {
 
 /// Something that can be undone or redone.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Deed {
+pub struct Undoable {
     /// Its first line in the journal.
     pub line: u64,
     /// What it was, in words.
@@ -30,7 +30,7 @@ pub struct Deed {
 }
 
 /// Whether an entry can be undone.
-const fn is_deed(entry: &Entry) -> bool {
+const fn is_undoable(entry: &Entry) -> bool {
     matches!(
         entry,
         Entry::Sample(_)
@@ -54,18 +54,18 @@ fn belong_together(taken: &Line, keep: &Line) -> bool {
 
 impl Session {
     /// What would be undone next.
-    pub fn undoable(&self) -> Option<Deed> {
-        self.deed(&self.last_deed())
+    pub fn undoable(&self) -> Option<Undoable> {
+        self.described(&self.last_undoable())
     }
 
     /// What would be redone next.
-    pub fn redoable(&self) -> Option<Deed> {
-        self.deed(self.history.redo.last()?)
+    pub fn redoable(&self) -> Option<Undoable> {
+        self.described(self.history.redo.last()?)
     }
 
-    /// Lines of the last deed that is not undone, in order.
-    fn last_deed(&self) -> Vec<u64> {
-        let is_open = |line: &&Arc<Line>| is_deed(&line.entry) && !self.history.undone.contains(&line.number);
+    /// Lines of the last action that is not undone, in order.
+    fn last_undoable(&self) -> Vec<u64> {
+        let is_open = |line: &&Arc<Line>| is_undoable(&line.entry) && !self.history.undone.contains(&line.number);
         let mut open = self.history.lines.iter().rev().filter(is_open);
         match (open.next(), open.next()) {
             (Some(last), Some(before)) if belong_together(before, last) => vec![before.number, last.number],
@@ -74,13 +74,14 @@ impl Session {
         }
     }
 
-    fn deed(&self, lines: &[u64]) -> Option<Deed> {
+    fn described(&self, lines: &[u64]) -> Option<Undoable> {
         let line = *lines.first()?;
         let entry = &self.history.lines.iter().find(|known| known.number == line)?.entry;
-        Some(Deed { line, what: self.in_words(entry) })
+        Some(Undoable { line, what: self.in_words(entry) })
     }
 
-    /// A deed in a few words.
+    /// An action in a few words.
+    #[expect(clippy::wildcard_enum_match_arm, reason = "all others have words of their own")]
     fn in_words(&self, entry: &Entry) -> String {
         let of_row = |row: usize| self.row_name(row);
         let of_sample = |number: u64| self.sample(number).map_or_else(String::new, |sample| of_row(sample.row));
@@ -126,30 +127,30 @@ impl Session {
             self.history.base = Some(Arc::new(self.clone()));
         } else if self.history.base.is_some() {
             self.history.lines.push(Arc::new(line.clone()));
-            if is_deed(&line.entry) {
+            if is_undoable(&line.entry) {
                 self.history.redo.clear();
             }
         }
     }
 
-    /// Undoes the last deed, which begins in line `undone`.
+    /// Undoes the last action, which begins in line `undone`.
     pub(super) fn undo(&mut self, line: &Line, undone: u64) -> Result<(), FoldError> {
-        let deed = self.last_deed();
-        if deed.first() != Some(&undone) {
+        let lines = self.last_undoable();
+        if lines.first() != Some(&undone) {
             return Err(misfit(line, "an undo of what was not done last"));
         }
         let mut history = self.history.clone();
-        history.undone.extend(&deed);
-        history.redo.push(deed);
+        history.undone.extend(&lines);
+        history.redo.push(lines);
         self.fold_again(history, line, undone)
     }
 
     /// Redoes what was undone last, which begins in line `redone`.
     pub(super) fn redo(&mut self, line: &Line, redone: u64) -> Result<(), FoldError> {
         let mut history = self.history.clone();
-        let deed = history.redo.pop().filter(|deed| deed.first() == Some(&redone));
-        let deed = deed.ok_or_else(|| misfit(line, "a redo of what was not undone last"))?;
-        history.undone.retain(|undone| !deed.contains(undone));
+        let lines = history.redo.pop().filter(|lines| lines.first() == Some(&redone));
+        let lines = lines.ok_or_else(|| misfit(line, "a redo of what was not undone last"))?;
+        history.undone.retain(|undone| !lines.contains(undone));
         self.fold_again(history, line, redone)
     }
 
@@ -158,10 +159,12 @@ impl Session {
         let base = history.base.clone().ok_or_else(|| misfit(line, "an undo without a plan"))?;
         let mut session = Self::clone(&base);
         for known in &history.lines {
-            match &known.entry {
-                Entry::Undone { .. } | Entry::Redone { .. } => session.advance(known),
-                _ if history.undone.contains(&known.number) => session.apply_undone(known),
-                _ => session.apply_once(known)?,
+            if matches!(known.entry, Entry::Undone { .. } | Entry::Redone { .. }) {
+                session.advance(known);
+            } else if history.undone.contains(&known.number) {
+                session.apply_undone(known);
+            } else {
+                session.apply_once(known)?;
             }
         }
         session.advance(line);
@@ -173,6 +176,7 @@ impl Session {
     }
 
     /// Row of the plan that a line is about.
+    #[expect(clippy::wildcard_enum_match_arm, reason = "of what can be undone, only these are about a row")]
     fn row_of(&self, history: &History, line: u64) -> Option<usize> {
         match &history.lines.iter().find(|known| known.number == line)?.entry {
             Entry::Sample(noted) => Some(noted.row),
@@ -183,6 +187,7 @@ impl Session {
     }
 
     /// What remains of a line that is undone: the sample is still to be seen, and its number is used.
+    #[expect(clippy::wildcard_enum_match_arm, reason = "of what can be undone, only these leave something")]
     fn apply_undone(&mut self, line: &Line) {
         match &line.entry {
             Entry::Sample(noted) => self.add_undone(noted, line),

@@ -67,7 +67,7 @@ fn sample(number: u64, row: usize) -> Entry {
 
 /// One of everything that changes which samples count.
 #[derive(Clone, Debug)]
-enum Deed {
+enum Step {
     Measure(usize),
     Decide(u64, Decision),
     Swap(u64, u64),
@@ -78,34 +78,34 @@ enum Deed {
     Replan,
 }
 
-fn deed() -> impl Strategy<Value = Deed> {
+fn step() -> impl Strategy<Value = Step> {
     let number = || 1..9_u64;
     prop_oneof![
-        4 => (0..ROWS).prop_map(Deed::Measure),
+        4 => (0..ROWS).prop_map(Step::Measure),
         3 => (number(), prop_oneof![Just(Decision::Keep), Just(Decision::LeaveOut), Just(Decision::Undo)])
-            .prop_map(|(number, decision)| Deed::Decide(number, decision)),
-        2 => (number(), number()).prop_map(|(first, second)| Deed::Swap(first, second)),
-        2 => (number(), 0..ROWS).prop_map(|(number, row)| Deed::Move(number, row)),
-        1 => (number(), proptest::option::of(number())).prop_map(|(since, until)| Deed::Scale(since, until)),
-        1 => (0..4_usize).prop_map(Deed::TakeBack),
-        1 => (0..ROWS, any::<bool>()).prop_map(|(row, skipped)| Deed::Skip(row, skipped)),
-        1 => Just(Deed::Replan),
+            .prop_map(|(number, decision)| Step::Decide(number, decision)),
+        2 => (number(), number()).prop_map(|(first, second)| Step::Swap(first, second)),
+        2 => (number(), 0..ROWS).prop_map(|(number, row)| Step::Move(number, row)),
+        1 => (number(), proptest::option::of(number())).prop_map(|(since, until)| Step::Scale(since, until)),
+        1 => (0..4_usize).prop_map(Step::TakeBack),
+        1 => (0..ROWS, any::<bool>()).prop_map(|(row, skipped)| Step::Skip(row, skipped)),
+        1 => Just(Step::Replan),
     ]
 }
 
-fn entry(deed: &Deed, session: &Session) -> Entry {
-    match *deed {
-        Deed::Measure(row) => sample(session.measurements + 1, row),
-        Deed::Decide(sample, decision) => Entry::Decision { sample, decision },
-        Deed::Swap(first, second) => Entry::Correction(Correction::Swap { first, second }),
-        Deed::Move(sample, row) => Entry::Correction(Correction::Row { sample, row }),
-        Deed::Scale(since, until) => Entry::Correction(Correction::Scale { since, factor: 2.0, until }),
-        Deed::TakeBack(place) => {
+fn entry(step: &Step, session: &Session) -> Entry {
+    match *step {
+        Step::Measure(row) => sample(session.measurements + 1, row),
+        Step::Decide(sample, decision) => Entry::Decision { sample, decision },
+        Step::Swap(first, second) => Entry::Correction(Correction::Swap { first, second }),
+        Step::Move(sample, row) => Entry::Correction(Correction::Row { sample, row }),
+        Step::Scale(since, until) => Entry::Correction(Correction::Scale { since, factor: 2.0, until }),
+        Step::TakeBack(place) => {
             let line = session.corrections.get(place).map_or(0, |corrected| corrected.line);
             Entry::Correction(Correction::TakenBack { line })
         }
-        Deed::Skip(row, skipped) => Entry::Skipped { row, skipped },
-        Deed::Replan => Entry::Plan(plan()),
+        Step::Skip(row, skipped) => Entry::Skipped { row, skipped },
+        Step::Replan => Entry::Plan(plan()),
     }
 }
 
@@ -113,14 +113,14 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn a_row_has_one_sample_that_counts_and_nothing_measured_is_lost(deeds in proptest::collection::vec(deed(), 0..25)) {
+    fn a_row_has_one_sample_that_counts_and_nothing_measured_is_lost(steps in proptest::collection::vec(step(), 0..25)) {
         let mut session = begun();
         let mut measured = 0;
-        for deed in deeds {
+        for step in steps {
             let before = session.clone();
-            let entry = entry(&deed, &session);
+            let entry = entry(&step, &session);
             if session.apply(&line(session.lines + 1, 0, entry)).is_ok() {
-                measured += usize::from(matches!(deed, Deed::Measure(_)));
+                measured += usize::from(matches!(step, Step::Measure(_)));
             } else {
                 prop_assert_eq!(&session, &before, "an entry that does not fit changes nothing");
             }
@@ -129,7 +129,7 @@ proptest! {
                 let stands = session.samples.iter().filter(|sample| {
                     sample.row == row && matches!(sample.state, SampleState::Counts | SampleState::LeftOut)
                 });
-                prop_assert!(stands.count() <= 1, "row {} after {:?}: {:?}", row, deed, session.samples);
+                prop_assert!(stands.count() <= 1, "row {} after {:?}: {:?}", row, step, session.samples);
                 let is_open = session.is_open(row);
                 prop_assert!(!is_open || session.sample_of_row(row).is_none());
             }
@@ -149,10 +149,10 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn a_correction_that_is_taken_back_leaves_nothing(deeds in proptest::collection::vec(deed(), 0..25), correction in deed()) {
+    fn a_correction_that_is_taken_back_leaves_nothing(steps in proptest::collection::vec(step(), 0..25), correction in step()) {
         let mut session = begun();
-        for deed in deeds {
-            let entry = entry(&deed, &session);
+        for step in steps {
+            let entry = entry(&step, &session);
             drop(session.apply(&line(session.lines + 1, 0, entry)));
         }
         let before = standing(&session);

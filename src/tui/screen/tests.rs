@@ -98,7 +98,7 @@ fn instrument(choice: Option<&str>, identity: Option<&str>) -> ViewModel {
 
 fn target(choice: Option<&str>, circles: Option<CirclesView>) -> ViewModel {
     let is_complete = circles.as_ref().is_some_and(|circles| circles.result.is_some());
-    let content = Content::Target(TargetView {
+    let content = Content::Target(Box::new(TargetView {
         nominal_mm: [-1.473, 26.384, 71.991],
         nominal_sigma_mm: 0.5,
         choice: choice.map(str::to_owned),
@@ -106,7 +106,7 @@ fn target(choice: Option<&str>, circles: Option<CirclesView>) -> ViewModel {
         circles,
         joint_check: None,
         advises_joint_check: false,
-    });
+    }));
     let unusable = (!is_complete).then(|| "the circles are not complete".to_owned());
     let offers = vec![
         IntentInfo::new(Intent::ChooseTarget(TargetChoice::Profile), "as the profile says").default_action(),

@@ -17,7 +17,7 @@ use crate::session::journal::{
 use crate::session::plan::PoseKind;
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step};
-use crate::session::state::{Deed, Row, Sample, SampleState, Session};
+use crate::session::state::{Row, Sample, SampleState, Session, Undoable};
 use crate::text::printable;
 use crate::units::{from_mm, to_mm};
 use crate::wizard::effect::{Answer, Request};
@@ -385,8 +385,8 @@ impl CaptureStep {
 }
 
 /// The label of undo or redo, with what it would be.
-fn turned(verb: &str, deed: Option<Deed>) -> String {
-    deed.map_or_else(|| verb.to_owned(), |deed| format!("{verb}: {}", deed.what))
+fn turned(verb: &str, action: Option<Undoable>) -> String {
+    action.map_or_else(|| verb.to_owned(), |action| format!("{verb}: {}", action.what))
 }
 
 /// The row of a pose by its name: an open one, else a skipped one, else one that is done.
@@ -514,12 +514,12 @@ impl StepMachine for CaptureStep {
                 self.row.map(|row| Action::Write(vec![Entry::Skipped { row, skipped: true }])).into_iter().collect()
             }
             Intent::Undo => {
-                let deed = session.undoable().map(|Deed { line, what }| Entry::Undone { line, what });
-                deed.map(|entry| Action::Write(vec![entry])).into_iter().collect()
+                let entry = session.undoable().map(|Undoable { line, what }| Entry::Undone { line, what });
+                entry.map(|entry| Action::Write(vec![entry])).into_iter().collect()
             }
             Intent::Redo => {
-                let deed = session.redoable().map(|Deed { line, what }| Entry::Redone { line, what });
-                deed.map(|entry| Action::Write(vec![entry])).into_iter().collect()
+                let entry = session.redoable().map(|Undoable { line, what }| Entry::Redone { line, what });
+                entry.map(|entry| Action::Write(vec![entry])).into_iter().collect()
             }
             Intent::Exclude(pose) => Self::count_pose(&pose, false, session),
             Intent::Include(pose) => Self::count_pose(&pose, true, session),

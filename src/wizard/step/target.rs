@@ -471,7 +471,7 @@ impl StepMachine for TargetStep {
 
     fn content(&self, cx: &Cx<'_>) -> Content {
         let target = cx.robot().and_then(|robot| robot.profile.targets().first());
-        Content::Target(TargetView {
+        Content::Target(Box::new(TargetView {
             nominal_mm: target.map_or([0.0; 3], |target| {
                 let point = target.position_in_flange;
                 [to_mm(point.x), to_mm(point.y), to_mm(point.z)]
@@ -482,7 +482,7 @@ impl StepMachine for TargetStep {
             circles: self.circles(cx),
             joint_check: joint_check::view(&self.check, cx),
             advises_joint_check: joint_check::is_advisable(cx.session),
-        })
+        }))
     }
 }
 

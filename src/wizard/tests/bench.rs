@@ -13,6 +13,7 @@ use crate::procedure::identify::identify;
 use crate::procedure::models::models;
 use crate::profile::{Profile, builtin};
 use crate::session::journal::{Entry, Journal, Line};
+use crate::session::measurements::NamedPoint;
 use crate::session::plan::{PlannedPose, PoseKind};
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, Step, TargetChoice};
@@ -21,8 +22,8 @@ use crate::session::state::Session;
 use crate::units::{DEGREE, MICROMETRE, MILLIMETRE};
 use crate::wizard::view::{CaptureView, Content};
 use crate::wizard::{
-    Answer, CircleConfigurations, Effect, Event, Intent, JointCheckStop, NamedPoint, PlanSettings, Problem, Request,
-    RequestId, StoreEvent, ViewModel, Wizard,
+    Answer, CircleConfigurations, Effect, Event, Intent, JointCheckStop, PlanSettings, Problem, Request, RequestId,
+    StoreEvent, ViewModel, Wizard,
 };
 
 /// A robot program, whatever its file is called.

@@ -290,7 +290,7 @@ fn the_whole_history_is_undone_and_redone() {
         before.push(picture(&bench));
         assert_eq!(fold(&bench.journal), *bench.wizard.session(), "a resumed session is the same");
     }
-    assert_eq!(before.len(), 11, "ten deeds");
+    assert_eq!(before.len(), 11, "ten actions");
     let nothing = before.last().unwrap();
     assert_eq!((nothing.2, nothing.3, nothing.4), (0, MEASURED, 0));
     assert!(nothing.0.iter().all(|row| row.state == RowState::Open) && nothing.1.is_empty());

@@ -85,12 +85,22 @@ pub(super) fn can_start(plan: &[JointCheckStop], session: &Session) -> Condition
         .and_then(|()| require(!is_complete, "the joints are checked; measure the check again to repeat it"))
 }
 
-/// The result, when the stops of all joints are measured.
-fn result(session: &Session) -> Option<Option<JointCheck>> {
-    let profile = session.mounted_profile()?;
-    let robot = session.robot.as_ref()?;
+/// What the points of the check say.
+enum Outcome {
+    /// Points are missing.
+    Incomplete,
+    /// No arm fits them.
+    Undetermined,
+    Checked(JointCheck),
+}
+
+fn outcome(session: &Session) -> Outcome {
+    let Some((profile, robot)) = session.mounted_profile().zip(session.robot.as_ref()) else {
+        return Outcome::Incomplete;
+    };
+    let Some(target) = profile.targets().first() else { return Outcome::Incomplete };
     if session.joint_check.len() <= profile.chain().dof() {
-        return None;
+        return Outcome::Incomplete;
     }
     let stops: Vec<CheckedStop> = session
         .joint_check
@@ -101,11 +111,10 @@ fn result(session: &Session) -> Option<Option<JointCheck>> {
             point: from_xyz_mm(point.xyz_mm),
         })
         .collect();
-    let target = profile.targets().first()?;
     let distance = profile.tracker().position_in_base.coords.norm();
     let sigma = profile.instrument().map_or(UNKNOWN_SIGMA, |instrument| instrument.sigma_at(distance));
     let expected = (target.position_in_flange, target.uncertainty.max(FREE_TARGET_UNCERTAINTY));
-    Some(check_joints(profile.chain(), &stops, expected, sigma))
+    check_joints(profile.chain(), &stops, expected, sigma).map_or(Outcome::Undetermined, Outcome::Checked)
 }
 
 /// A fault in words, with what to change in the profile.
@@ -179,8 +188,12 @@ fn verdict(check: &JointCheck, profile: &Profile) -> JointCheckVerdict {
 /// The message about a complete check.
 pub(super) fn conclusion(session: &Session) -> Option<Notice> {
     let profile = session.mounted_profile()?;
-    let Some(check) = result(session)? else {
-        return Some(Notice::error("the points of the joint check determine nothing").hint("measure them again"));
+    let check = match outcome(session) {
+        Outcome::Incomplete => return None,
+        Outcome::Undetermined => {
+            return Some(Notice::error("the points of the joint check determine nothing").hint("measure them again"));
+        }
+        Outcome::Checked(check) => check,
     };
     let verdict = verdict(&check, &profile);
     let Some(first) = verdict.faults.first() else {
@@ -210,7 +223,7 @@ pub(super) fn view(plan: &[JointCheckStop], cx: &Cx<'_>) -> Option<JointCheckVie
     let before = session.joint_check.last().map(|point| &point.joints);
     let shown = next.map_or(&[][..], |stop| stop.configuration.as_slice());
     let moved = next.and_then(|stop| stop.joint);
-    let result = result(session);
+    let outcome = outcome(session);
     Some(JointCheckView {
         joint: moved.and_then(|joint| joints.get(joint)).map(|joint| joint.name.clone()),
         joints: joints
@@ -232,8 +245,9 @@ pub(super) fn view(plan: &[JointCheckStop], cx: &Cx<'_>) -> Option<JointCheckVie
             .collect(),
         measured: session.joint_check.len(),
         of: joints.len() + 1,
-        problem: matches!(result, Some(None)).then(|| "the points determine nothing: measure them again".to_owned()),
-        verdict: result.flatten().map(|check| verdict(&check, &profile)),
+        problem: matches!(outcome, Outcome::Undetermined)
+            .then(|| "the points determine nothing: measure them again".to_owned()),
+        verdict: if let Outcome::Checked(check) = outcome { Some(verdict(&check, &profile)) } else { None },
         typed_unit: match session.instrument {
             Some(InstrumentChoice::Manual { unit }) => Some(CoordinateUnit::sign(unit).to_owned()),
             _ => None,
