@@ -25,14 +25,16 @@ fn measured(profile: &Profile, faults: &[JointFault]) -> Vec<CheckedStop> {
         let id = |parameter| ParameterId::Link { joint, parameter };
         [(id(LinkParameter::Theta), sign * 0.2 * DEGREE), (id(LinkParameter::A), sign * 0.4 * MILLIMETRE)]
     });
-    let real = profile.arm().with(deviations).map_or_else(|_| profile.arm(), |arm| arm).chain;
+    let real = profile.arm().with(deviations).unwrap().chain;
     let forward = ForwardKinematics::new(&real);
     let target = profile.targets()[0].position_in_flange + Vector3::new(0.02, -0.02, 0.01);
     let base_from_tracker = Isometry3::new(Vector3::new(2.5, -1.0, 0.6), Vector3::new(0.2, -0.1, 2.0));
     let is_mirrored = faults.contains(&JointFault::Mirrored);
     let seen = |(index, stop): (usize, Stop)| {
         let mut q = stop.configuration.clone();
-        faults.iter().for_each(|fault| fault.correct(&stop.configuration, &mut q));
+        for fault in faults {
+            fault.correct(&stop.configuration, &mut q);
+        }
         let noise = |phase: f64| 20.0 * MICROMETRE * (7.3 * index as f64 + phase).sin();
         let point = base_from_tracker.inverse() * forward.point_in_base(&q, &target);
         let point = point + Vector3::new(noise(0.0), noise(2.0), noise(4.0));

@@ -272,7 +272,9 @@ fn shifted_columns_with_zeros_are_named() {
     for first in [1, 2] {
         let mut bench = Bench::builtin("abb_irb120", 16);
         let mut poses = bench.configurations(40);
-        poses.iter_mut().for_each(|q| q[..first].fill(0.0));
+        for q in &mut poses {
+            q[..first].fill(0.0);
+        }
         let samples = bench.measured(&poses, 0);
         let shifted = altered(&samples, |q| {
             q.rotate_left(first);

@@ -109,7 +109,7 @@ fn a_zero_that_only_the_place_of_the_smr_could_show_is_named() {
         match bench.try_identify(turned(&known), turned(&fresh)) {
             Ok(turned) => assert!(turned.summary.verdict.status != VerdictStatus::Accepted || !is_tested),
             Err(refused) => {
-                assert!(is_tested && refused.to_string().contains("joint J6 has another zero"), "{refused}")
+                assert!(is_tested && refused.to_string().contains("joint J6 has another zero"), "{refused}");
             }
         }
     }
