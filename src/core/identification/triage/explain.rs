@@ -471,9 +471,10 @@ impl<'a> Case<'a, '_> {
         let without = [&self.aside[..], &[sample]].concat();
         let others = self.fit(&without, None, |_| {})?;
         let item = &self.items[sample];
-        let innovation = others.innovation(item);
-        let sigma = (innovation.covariance.trace() / 3.0).sqrt();
-        RejectionReason::typed(&item.point, &others.fitting(item, &innovation), sigma)
+        let fitting = others.fitting(item, &others.innovation(item));
+        // Far off, the point would scatter by the turn of the frame as well.
+        let there = others.innovation(&Item { point: fitting, ..item.clone() });
+        RejectionReason::typed(&item.point, &fitting, (there.covariance.trace() / 3.0).sqrt())
     }
 
     /// How far a sample is off the others, and the distances that show it.

@@ -332,7 +332,8 @@ fn several_suspects_are_all_named() {
 #[test]
 fn an_early_exchange_is_not_called_a_bad_reading_alone() {
     let mut session = Session::new(12);
-    session.samples[5].point.x += from_mm(300.0);
+    let away = Vector3::new(from_mm(211.3), from_mm(-187.9), from_mm(41.7));
+    session.samples[5].point += away;
     let early = session.after(6).unwrap();
     assert_eq!((early.sample, &early.cause, early.is_early), (5, &Cause::Unexplained, true));
     assert!(
@@ -341,7 +342,7 @@ fn an_early_exchange_is_not_called_a_bad_reading_alone() {
         told(&early)
     );
     let mut session = Session::new(12);
-    session.samples[15].point.x += from_mm(300.0);
+    session.samples[15].point += away;
     let late = session.after(16).unwrap();
     assert!(!late.is_early && !told(&late).contains("exchanged"), "{}", told(&late));
 }
@@ -359,7 +360,7 @@ fn slips_of_the_pen_are_named_while_measuring() {
             && text.ends_with("compare the coordinates with the display of the instrument, or measure it again"),
         "{text}"
     );
-    for (axis, by) in [(0, 30.0), (2, -40.0)] {
+    for (axis, by) in [(0, 3.0), (0, 30.0), (1, 70.0), (1, -70.0), (2, -40.0), (0, 500.0)] {
         let mut session = Session::new(12);
         session.samples[15].point[axis] += from_mm(by);
         let finding = session.after(16).unwrap();

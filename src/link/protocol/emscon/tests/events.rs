@@ -92,7 +92,7 @@ fn an_error_of_the_measurement_ends_it_and_one_of_another_command_stops_it_too()
 #[test]
 fn an_error_that_nobody_waits_for_is_said() {
     let mut bench = ready(&[]);
-    assert_eq!(statuses(&said(&mut bench, &packet(&[1, 55, 41]))), ["unlisted number (55): module timed out (41)"]);
+    assert_eq!(statuses(&said(&mut bench, &packet(&[1, 58, 41]))), ["unlisted number (58): module timed out (41)"]);
     let events = said(&mut bench, &packet(&[1, 0, 10_011]));
     assert!(matches!(events.as_slice(), [ProtocolEvent::Lost(Failure::InUse(_))]), "{events:?}");
 }
