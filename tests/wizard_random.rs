@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use trupose::kinematics::ForwardKinematics;
 use trupose::procedure::correct::ProgramFile;
 use trupose::procedure::identify::identify;
-use trupose::procedure::models::models;
+use trupose::procedure::models::{Models, models};
 use trupose::profile::{Profile, builtin};
 use trupose::session::about::About;
 use trupose::session::corrected::{CorrectedText, Points, ProgramChoice};
@@ -53,6 +53,8 @@ struct Cell {
     writing: Option<(RequestId, Vec<Line>)>,
     exits: usize,
     sessions: usize,
+    /// The first models of this cell.
+    models: Option<Models>,
 }
 
 fn start() -> Timestamp {
@@ -71,6 +73,7 @@ impl Cell {
             writing: None,
             exits: 0,
             sessions: 0,
+            models: None,
         }
     }
 
@@ -311,7 +314,10 @@ impl Cell {
                 Ok(identified) => Answer::Identified(Box::new(identified)),
                 Err(error) => Answer::Failed(error.into()),
             },
-            Request::Model(request) => Answer::Modelled(Box::new(models(request))),
+            // Proving the models takes longer than a hundred other answers, and the wizard only passes them on.
+            Request::Model(request) => {
+                Answer::Modelled(Box::new(self.models.get_or_insert_with(|| models(request)).clone()))
+            }
             Request::Deliver { files, left_out } => {
                 let files = files.iter().map(|(name, _)| name.clone()).collect();
                 Answer::Delivered { files, sums: Vec::new(), left_out: left_out.clone() }
