@@ -9,7 +9,7 @@ use crate::planning::collision::ArmShape;
 use crate::profile::Profile;
 use crate::session::plan::PlannedPose;
 
-/// Collisions that are named; of more, only the number is told.
+/// Collisions that are named; of more, only the number is given.
 const NAMED: usize = 5;
 
 /// The first few collisions in words, and the number of all others last. Nothing without bodies.

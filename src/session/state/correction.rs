@@ -162,8 +162,8 @@ impl Session {
                 }
                 let sample = self.sample_mut(*sample)?;
                 sample.joints.clone_from(joints);
-                let mended = sample.noted.number;
-                self.settle(|number| number == mended);
+                let corrected = sample.noted.number;
+                self.settle(|number| number == corrected);
             }
             Correction::TakenBack { .. } => return None,
         }

@@ -80,7 +80,7 @@ fn line(number: u64) -> Line {
 const BATCHES: [u64; 4] = [2, 1, 3, 1];
 
 /// Appends all batches, trying each until it is written; after every failure `check` sees what is on the medium with the number
-/// of lines that were acknowledged, and mends what is to be mended. Returns the number of failures.
+/// of lines that were acknowledged, and repairs what is to be repaired. Returns the number of failures.
 fn write_all(medium: &Faulty, mut check: impl FnMut(&[u8], u64)) -> usize {
     let mut writer = JournalWriter::after(medium.clone(), &Journal::default());
     let (mut acknowledged, mut failures) = (0, 0);

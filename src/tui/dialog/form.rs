@@ -118,7 +118,7 @@ impl Form {
         self
     }
 
-    /// Lets Enter take over what a link sees into the last field, and go on to the next one.
+    /// Lets Enter take over what a link sees into the last field, and move on to the next one.
     #[must_use]
     pub fn taking(mut self, take: Take) -> Self {
         if let Some(field) = self.fields.last_mut() {
@@ -252,7 +252,7 @@ impl Form {
         FieldOutcome::Changed
     }
 
-    /// Whether Enter goes on to the next field: a link sees what this one takes.
+    /// Whether Enter moves on to the next field: a link sees what this one takes.
     fn is_on_the_way(&self) -> bool {
         self.offered(self.focus).is_some()
     }
