@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Roll, pitch and yaw turn about the fixed axes x, y and z, as in URDF; other forms of orientation are recognised by their names
-//! (see [`super::orientation`]), and without any the orientation is free. Joint values beside a Cartesian target say which branch (elbow, wrist)
+//! (see `orientation`), and without any the orientation is free. Joint values beside a Cartesian target say which branch (elbow, wrist)
 //! is meant. Other columns are kept. Units as in all tables: `mm`, `m`, `um`, `in`, `deg`, `rad`.
 
 use nalgebra::UnitQuaternion;

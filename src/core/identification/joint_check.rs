@@ -3,7 +3,7 @@
 //! that the nominal arm says.
 //!
 //! The points of a hypothesis are registered to the measured ones, with the place of the reflector in the flange left free, so that
-//! neither the instrument nor the reflector has to be known. Hypotheses are the nominal arm, and the arm with up to [`MOST_FAULTS`]
+//! neither the instrument nor the reflector has to be known. Hypotheses are the nominal arm, and the arm with up to three
 //! of the faults that a profile can have. The nominal arm is preferred to whatever explains the points no better.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Vector3};
