@@ -173,7 +173,10 @@ fn a_technician_measures_over_a_wire_whatever_goes_wrong() {
     let address = cell.address.clone();
     technician.fill(&[Some(&address), Some("(measure_ms: 200)")]);
     technician.sees(LONG, "the tracker", |shown| shown.has("answers") && !shown.has("cancel connecting"));
-    technician.does("n", "step 3", |shown| shown.step() == Some(3));
+    // A moment passes between the answer and the first point.
+    technician.sees(LONG, "a point", |shown| shown.has("sees "));
+    technician.keys += 1;
+    technician.terminal.send_until("n", "step 3", |shown| shown.step() == Some(3));
     technician.does("p", "the choice", |shown| shown.has("chosen       as the profile says"));
     technician.does("n", "step 4", |shown| shown.step() == Some(4));
     technician.press("18\u{1b}[B10\u{1b}[B120\u{1b}[B\u{1b}[B0");
