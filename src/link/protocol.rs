@@ -37,6 +37,8 @@ use std::time::Duration;
 
 use nalgebra::Point3;
 
+use outbox::Outbox;
+
 /// Time since an arbitrary start chosen by the owner of the protocol; only differences matter.
 pub type Moment = Duration;
 
@@ -51,8 +53,14 @@ pub trait Protocol: Send + Debug {
     /// Handles deadlines, retries and keep-alives that are due.
     fn tick(&mut self, now: Moment);
 
-    /// Requests one shot. Answered by [`ProtocolEvent::Failed`] if the link is not ready or another shot is in progress.
-    fn trigger(&mut self, now: Moment);
+    /// The queues of what is to be sent and of the events.
+    fn outbox(&mut self) -> &mut Outbox;
+
+    /// Requests one shot. Answered by [`ProtocolEvent::Failed`] if the link is not ready or another shot is in progress, and by
+    /// robots, which take none.
+    fn trigger(&mut self, _now: Moment) {
+        self.outbox().refuse_shot();
+    }
 
     /// Turns the instrument to a place in its own frame (m), where it searches for the reflector; answered by
     /// [`ProtocolEvent::Pointed`] or [`ProtocolEvent::Failed`]. Returns `false` if the instrument cannot be turned.
@@ -61,10 +69,12 @@ pub trait Protocol: Send + Debug {
     }
 
     /// Cancels the shot in progress without an answer; a late result of it is discarded.
-    fn cancel(&mut self, now: Moment);
+    fn cancel(&mut self, _now: Moment) {}
 
     /// The next bytes to send.
-    fn next_output(&mut self) -> Option<Vec<u8>>;
+    fn next_output(&mut self) -> Option<Vec<u8>> {
+        self.outbox().next_output()
+    }
 
     /// The TCP port at which the conversation continues: the connection is closed, and another one opened there, before anything
     /// more is sent.
@@ -78,7 +88,9 @@ pub trait Protocol: Send + Debug {
     }
 
     /// The next event.
-    fn next_event(&mut self) -> Option<ProtocolEvent>;
+    fn next_event(&mut self) -> Option<ProtocolEvent> {
+        self.outbox().next_event()
+    }
 
     /// The latest time for the next call of [`Self::tick`].
     fn next_deadline(&self) -> Option<Moment>;

@@ -32,7 +32,8 @@ pub use status::{
 };
 
 use self::conversation::Conversation;
-use super::{Moment, Protocol, ProtocolEvent};
+use super::outbox::Outbox;
+use super::{Moment, Protocol};
 
 /// TCP port at which trackers listen by default.
 pub const PORT: u16 = 700;
@@ -121,12 +122,8 @@ impl Protocol for Emscon {
         self.conversation.cancel(now);
     }
 
-    fn next_output(&mut self) -> Option<Vec<u8>> {
-        self.conversation.outbox.next_output()
-    }
-
-    fn next_event(&mut self) -> Option<ProtocolEvent> {
-        self.conversation.outbox.next_event()
+    fn outbox(&mut self) -> &mut Outbox {
+        &mut self.conversation.outbox
     }
 
     fn next_deadline(&self) -> Option<Moment> {

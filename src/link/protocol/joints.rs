@@ -236,18 +236,8 @@ impl Protocol for JointLines {
         self.lose(Failure::Silent { what, seconds: limit.as_secs_f64() });
     }
 
-    fn trigger(&mut self, _now: Moment) {
-        self.outbox.refuse_shot();
-    }
-
-    fn cancel(&mut self, _now: Moment) {}
-
-    fn next_output(&mut self) -> Option<Vec<u8>> {
-        self.outbox.next_output()
-    }
-
-    fn next_event(&mut self) -> Option<ProtocolEvent> {
-        self.outbox.next_event()
+    fn outbox(&mut self) -> &mut Outbox {
+        &mut self.outbox
     }
 
     fn next_deadline(&self) -> Option<Moment> {

@@ -335,18 +335,8 @@ impl Protocol for Rtde {
         self.lose(Failure::Silent { what: what.to_owned(), seconds });
     }
 
-    fn trigger(&mut self, _now: Moment) {
-        self.outbox.refuse_shot();
-    }
-
-    fn cancel(&mut self, _now: Moment) {}
-
-    fn next_output(&mut self) -> Option<Vec<u8>> {
-        self.outbox.next_output()
-    }
-
-    fn next_event(&mut self) -> Option<ProtocolEvent> {
-        self.outbox.next_event()
+    fn outbox(&mut self) -> &mut Outbox {
+        &mut self.outbox
     }
 
     fn next_deadline(&self) -> Option<Moment> {

@@ -6,6 +6,7 @@
 
 mod cell;
 pub mod fuzz;
+pub mod robots;
 pub mod streams;
 mod tests;
 

@@ -4,10 +4,11 @@ use std::time::Duration;
 
 use super::super::http::MAX_RESPONSE;
 use super::{Abb, AbbOptions, joint_angles};
-use crate::link::protocol::{Failure, JointState, ProtocolEvent};
+use crate::link::protocol::{Failure, ProtocolEvent};
 use crate::link::simulator::abb::{AbbFault, AbbSimulator};
 use crate::link::simulator::bench::Bench;
 use crate::link::simulator::bench::fuzz::{Bounds, fuzz_protocol, fuzz_simulator};
+use crate::link::simulator::bench::robots::joint_states;
 use crate::link::simulator::bench::streams::assert_splits_change_nothing;
 use crate::link::simulator::fault::Planned;
 
@@ -19,12 +20,6 @@ fn abb() -> Abb {
 
 fn bench(faults: &[Planned<AbbFault>]) -> AbbBench {
     Bench::new(abb(), AbbSimulator::new(faults.to_vec()))
-}
-
-fn joints(events: &[ProtocolEvent]) -> Vec<&JointState> {
-    let states =
-        events.iter().filter_map(|event| if let ProtocolEvent::Joints(state) = event { Some(state) } else { None });
-    states.collect()
 }
 
 #[test]
@@ -54,11 +49,8 @@ fn the_joints_of_the_robot_arrive_within_one_session() {
     let mut bench = bench(&[]);
     assert!(matches!(bench.settle().last(), Some(ProtocolEvent::Ready(_))));
     let events = bench.run_for(Duration::from_secs(4));
-    assert!(joints(&events).len() >= 18, "{}", joints(&events).len());
-    for state in joints(&events) {
-        let differences = state.positions.iter().zip(&bench.cell.joints.positions).map(|(a, b)| (a - b).abs());
-        assert!(differences.fold(0.0, f64::max) < 1e-8, "{state:?}");
-    }
+    assert!(joint_states(&events).len() >= 18, "{}", joint_states(&events).len());
+    bench.assert_joints(&joint_states(&events), 1e-8);
     bench.settle();
     assert_eq!(bench.simulator.sessions(), 1, "a new connection continues the session");
 }
@@ -69,7 +61,7 @@ fn faults_are_survived_or_said_and_a_new_connection_is_good() {
         let mut bench = bench(&[Planned::at(fault, 4)]);
         bench.settle();
         let events = bench.run_for(Duration::from_secs(4));
-        assert!(joints(&events).len() >= 12, "{fault}: {events:?}");
+        assert!(joint_states(&events).len() >= 12, "{fault}: {events:?}");
         assert!(!events.iter().any(|event| matches!(event, ProtocolEvent::Lost(_))), "{fault}: {events:?}");
     }
     for (fault, part) in [
@@ -80,12 +72,7 @@ fn faults_are_survived_or_said_and_a_new_connection_is_good() {
         (AbbFault::Closes, "closed the connection"),
         (AbbFault::DisconnectMidAnswer, "connection was lost"),
     ] {
-        let mut bench = bench(&[Planned::at(fault, 4)]);
-        bench.settle();
-        let events = bench.run_until(|event| matches!(event, ProtocolEvent::Lost(_)));
-        let Some(ProtocolEvent::Lost(failure)) = events.last() else { panic!("{fault}: {events:?}") };
-        assert!(failure.to_string().contains(part), "{fault}: {failure}");
-        assert!(matches!(bench.settle().last(), Some(ProtocolEvent::Ready(_))), "{fault}");
+        bench(&[Planned::at(fault, 4)]).assert_loss_is_said(&fault, part);
     }
 }
 
@@ -111,7 +98,7 @@ fn conversation() -> AbbBench {
 #[test]
 fn splits_change_nothing() {
     let events = assert_splits_change_nothing(abb, &conversation().tape);
-    assert!(joints(&events).len() > 3, "{events:?}");
+    assert!(joint_states(&events).len() > 3, "{events:?}");
 }
 
 #[test]

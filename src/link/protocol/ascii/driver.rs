@@ -417,12 +417,8 @@ impl Protocol for AsciiProtocol {
         self.capture = None;
     }
 
-    fn next_output(&mut self) -> Option<Vec<u8>> {
-        self.outbox.next_output()
-    }
-
-    fn next_event(&mut self) -> Option<ProtocolEvent> {
-        self.outbox.next_event()
+    fn outbox(&mut self) -> &mut Outbox {
+        &mut self.outbox
     }
 
     fn next_deadline(&self) -> Option<Moment> {

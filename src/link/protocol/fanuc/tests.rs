@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use super::{Fanuc, FanucOptions, Message};
 use crate::link::protocol::lines::MAX_LINE;
-use crate::link::protocol::{Failure, JointState, Protocol as _, ProtocolEvent};
+use crate::link::protocol::{Failure, Protocol as _, ProtocolEvent};
 use crate::link::simulator::bench::fuzz::{Bounds, fuzz_protocol, fuzz_simulator};
+use crate::link::simulator::bench::robots::joint_states;
 use crate::link::simulator::bench::streams::assert_splits_change_nothing;
 use crate::link::simulator::bench::{Bench, START};
 use crate::link::simulator::fanuc::{FanucFault, FanucSimulator};
@@ -15,12 +16,6 @@ type FanucBench = Bench<Fanuc, FanucSimulator>;
 
 fn bench(faults: &[Planned<FanucFault>]) -> FanucBench {
     Bench::new(Fanuc::default(), FanucSimulator::new(faults.to_vec()))
-}
-
-fn joints(events: &[ProtocolEvent]) -> Vec<&JointState> {
-    let states =
-        events.iter().filter_map(|event| if let ProtocolEvent::Joints(state) = event { Some(state) } else { None });
-    states.collect()
 }
 
 /// Forms of lines that public clients send and expect.
@@ -62,12 +57,9 @@ fn the_joints_of_the_robot_arrive_many_times_a_second() {
     let mut bench = bench(&[]);
     assert!(matches!(bench.settle().pop(), Some(ProtocolEvent::Ready(_))));
     let events = bench.run_for(Duration::from_secs(2));
-    let states = joints(&events);
+    let states = joint_states(&events);
     assert!((30..45).contains(&states.len()), "{}", states.len());
-    for state in states {
-        let differences = state.positions.iter().zip(&bench.cell.joints.positions).map(|(a, b)| (a - b).abs());
-        assert!(differences.fold(0.0, f64::max) < 1e-12, "{state:?}");
-    }
+    bench.assert_joints(&states, 1e-12);
 }
 
 #[test]
@@ -80,12 +72,7 @@ fn faults_are_said_and_a_new_connection_is_good() {
         (FanucFault::Silent, "no answer"),
         (FanucFault::DisconnectMidAnswer, "connection was lost"),
     ] {
-        let mut bench = bench(&[Planned::at(fault, 10)]);
-        bench.settle();
-        let events = bench.run_until(|event| matches!(event, ProtocolEvent::Lost(_)));
-        let Some(ProtocolEvent::Lost(failure)) = events.last() else { panic!("{fault}: {events:?}") };
-        assert!(failure.to_string().contains(part), "{fault}: {failure}");
-        assert!(matches!(bench.settle().last(), Some(ProtocolEvent::Ready(_))), "{fault}");
+        bench(&[Planned::at(fault, 10)]).assert_loss_is_said(&fault, part);
     }
     for (fault, part) in [
         (FanucFault::Refused, "FRC_Connect: error"),
@@ -98,13 +85,13 @@ fn faults_are_said_and_a_new_connection_is_good() {
     }
     let mut halves = bench(&[Planned::at(FanucFault::Halves, 5), Planned::at(FanucFault::OldName, 6)]);
     halves.settle();
-    assert!(joints(&halves.run_for(Duration::from_secs(2))).len() > 15);
+    assert!(joint_states(&halves.run_for(Duration::from_secs(2))).len() > 15);
     let mut now_and_then = bench(&[Planned::from(FanucFault::Refused, 5, 3), Planned::at(FanucFault::SystemFault, 9)]);
     now_and_then.settle();
     let events = now_and_then.run_for(Duration::from_secs(2));
     let said = format!("{events:?}");
     assert_eq!((said.matches("cannot be read now").count(), said.matches("reports a fault").count()), (1, 1));
-    assert!(joints(&events).len() > 15);
+    assert!(joint_states(&events).len() > 15);
     assert!(matches!(now_and_then.shoot().last(), Some(ProtocolEvent::Failed(Failure::Refused(_)))));
 }
 
@@ -119,7 +106,7 @@ fn conversation() -> FanucBench {
 #[test]
 fn splits_change_nothing() {
     let events = assert_splits_change_nothing(Fanuc::default, &conversation().tape);
-    assert!(joints(&events).len() > 3, "{events:?}");
+    assert!(joint_states(&events).len() > 3, "{events:?}");
 }
 
 #[test]

@@ -4,9 +4,10 @@ use std::time::Duration;
 
 use super::{AngleUnit, JointLine, JointLines};
 use crate::link::protocol::lines::MAX_LINE;
-use crate::link::protocol::{Failure, JointState, Protocol as _, ProtocolEvent};
+use crate::link::protocol::{Failure, Protocol as _, ProtocolEvent};
 use crate::link::simulator::bench::Bench;
 use crate::link::simulator::bench::fuzz::{Bounds, fuzz_protocol};
+use crate::link::simulator::bench::robots::joint_states;
 use crate::link::simulator::bench::streams::assert_splits_change_nothing;
 use crate::link::simulator::fault::Planned;
 use crate::link::simulator::joints::{JointsFault, JointsSimulator};
@@ -15,12 +16,6 @@ type JointsBench = Bench<JointLines, JointsSimulator>;
 
 fn bench(faults: &[Planned<JointsFault>]) -> JointsBench {
     Bench::new(JointLines::default(), JointsSimulator::new(faults.to_vec()))
-}
-
-fn joints(events: &[ProtocolEvent]) -> Vec<&JointState> {
-    let states =
-        events.iter().filter_map(|event| if let ProtocolEvent::Joints(state) = event { Some(state) } else { None });
-    states.collect()
 }
 
 fn close(one: &[f64], other: &[f64]) -> bool {
@@ -70,8 +65,8 @@ fn the_joints_of_the_robot_arrive_and_the_source_is_named() {
         let Some(ProtocolEvent::Ready(identity)) = bench.settle().pop() else { panic!("{fault:?}") };
         assert_eq!(identity.name, "SIMULATED controller");
         let events = bench.run_for(Duration::from_secs(1));
-        assert!(joints(&events).len() >= 5, "{events:?}");
-        assert!(joints(&events).iter().all(|state| close(&state.positions, &bench.cell.joints.positions)));
+        assert!(joint_states(&events).len() >= 5, "{events:?}");
+        assert!(joint_states(&events).iter().all(|state| close(&state.positions, &bench.cell.joints.positions)));
     }
 }
 
@@ -80,7 +75,7 @@ fn a_status_stops_and_broken_lines_are_skipped() {
     let mut stopped = bench(&[Planned::from(JointsFault::Stopped, 3, 2)]);
     stopped.settle();
     let events = stopped.run_for(Duration::from_secs(1));
-    let words: Vec<Option<&str>> = joints(&events).iter().map(|state| state.stopped.as_deref()).collect();
+    let words: Vec<Option<&str>> = joint_states(&events).iter().map(|state| state.stopped.as_deref()).collect();
     assert_eq!(words.iter().flatten().collect::<Vec<_>>(), [&"protective stop"; 2]);
     for fault in
         [JointsFault::Cut, JointsFault::NotANumber, JointsFault::WrongUnit, JointsFault::NoUnit, JointsFault::Noise]
@@ -88,8 +83,11 @@ fn a_status_stops_and_broken_lines_are_skipped() {
         let mut bench = bench(&[Planned::from(fault, 3, 4)]);
         bench.settle();
         let events = bench.run_for(Duration::from_secs(2));
-        assert_eq!(joints(&events).len(), 17, "{fault}: {events:?}");
-        assert!(joints(&events).iter().all(|state| close(&state.positions, &bench.cell.joints.positions)), "{fault}");
+        assert_eq!(joint_states(&events).len(), 17, "{fault}: {events:?}");
+        assert!(
+            joint_states(&events).iter().all(|state| close(&state.positions, &bench.cell.joints.positions)),
+            "{fault}"
+        );
         assert!(format!("{events:?}").contains("3 lines in a row cannot be read"), "{fault}: {events:?}");
     }
 }
@@ -122,7 +120,7 @@ fn conversation() -> JointsBench {
 fn splits_change_nothing() {
     for tape in [conversation().tape, conversation().tape.joined()] {
         let events = assert_splits_change_nothing(JointLines::default, &tape);
-        assert!(!joints(&events).is_empty(), "{events:?}");
+        assert!(!joint_states(&events).is_empty(), "{events:?}");
     }
 }
 

@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use super::{Answer, Kuka, MAX_ANSWER, joint_angles, read_request};
-use crate::link::protocol::{Failure, JointState, ProtocolEvent};
+use crate::link::protocol::{Failure, ProtocolEvent};
 use crate::link::simulator::bench::fuzz::{Bounds, fuzz_protocol, fuzz_simulator};
+use crate::link::simulator::bench::robots::joint_states;
 use crate::link::simulator::bench::streams::assert_splits_change_nothing;
 use crate::link::simulator::bench::{Bench, hex};
 use crate::link::simulator::fault::Planned;
@@ -14,12 +15,6 @@ type KukaBench = Bench<Kuka, KukaSimulator>;
 
 fn bench(faults: &[Planned<KukaFault>]) -> KukaBench {
     Bench::new(Kuka::default(), KukaSimulator::new(faults.to_vec()))
-}
-
-fn joints(events: &[ProtocolEvent]) -> Vec<&JointState> {
-    let states =
-        events.iter().filter_map(|event| if let ProtocolEvent::Joints(state) = event { Some(state) } else { None });
-    states.collect()
 }
 
 #[test]
@@ -52,12 +47,9 @@ fn the_joints_of_the_robot_arrive_twenty_times_a_second() {
     let Some(ProtocolEvent::Ready(identity)) = bench.settle().pop() else { panic!() };
     assert_eq!(identity.name, "KUKA controller, #KR_SIMULATED");
     let events = bench.run_for(Duration::from_secs(2));
-    let states = joints(&events);
+    let states = joint_states(&events);
     assert!((30..45).contains(&states.len()), "{}", states.len());
-    for state in states {
-        let differences = state.positions.iter().zip(&bench.cell.joints.positions).map(|(a, b)| (a - b).abs());
-        assert!(differences.fold(0.0, f64::max) < 1e-8, "{state:?}");
-    }
+    bench.assert_joints(&states, 1e-8);
 }
 
 #[test]
@@ -71,21 +63,16 @@ fn faults_are_said_and_a_new_connection_is_good() {
         (KukaFault::Silent, "no answer"),
         (KukaFault::DisconnectMidAnswer, "connection was lost"),
     ] {
-        let mut bench = bench(&[Planned::at(fault, 10)]);
-        bench.settle();
-        let events = bench.run_until(|event| matches!(event, ProtocolEvent::Lost(_)));
-        let Some(ProtocolEvent::Lost(failure)) = events.last() else { panic!("{fault}: {events:?}") };
-        assert!(failure.to_string().contains(part), "{fault}: {failure}");
-        assert!(matches!(bench.settle().last(), Some(ProtocolEvent::Ready(_))), "{fault}");
+        bench(&[Planned::at(fault, 10)]).assert_loss_is_said(&fault, part);
     }
     let mut halves = bench(&[Planned::at(KukaFault::Halves, 5)]);
     halves.settle();
-    assert!(joints(&halves.run_for(Duration::from_secs(2))).len() > 15);
+    assert!(joint_states(&halves.run_for(Duration::from_secs(2))).len() > 15);
     let mut now_and_then = bench(&[Planned::from(KukaFault::Unreadable, 5, 3)]);
     now_and_then.settle();
     let events = now_and_then.run_for(Duration::from_secs(2));
     assert_eq!(format!("{events:?}").matches("cannot be read now").count(), 1);
-    assert!(joints(&events).len() > 15);
+    assert!(joint_states(&events).len() > 15);
     let mut never = bench(&[Planned::always(KukaFault::Unreadable)]);
     assert!(matches!(never.settle().last(), Some(ProtocolEvent::Lost(Failure::Refused(_)))));
     assert!(matches!(never.shoot().last(), Some(ProtocolEvent::Failed(Failure::Refused(_)))));
@@ -102,7 +89,7 @@ fn conversation() -> KukaBench {
 #[test]
 fn splits_change_nothing() {
     let events = assert_splits_change_nothing(Kuka::default, &conversation().tape);
-    assert!(joints(&events).len() > 3, "{events:?}");
+    assert!(joint_states(&events).len() > 3, "{events:?}");
 }
 
 #[test]

@@ -500,16 +500,12 @@ impl Protocol for NdiProtocol {
         }
     }
 
-    fn next_output(&mut self) -> Option<Vec<u8>> {
-        self.outbox.next_output()
-    }
-
     fn next_line_change(&mut self) -> Option<LineChange> {
         self.line_change.take()
     }
 
-    fn next_event(&mut self) -> Option<ProtocolEvent> {
-        self.outbox.next_event()
+    fn outbox(&mut self) -> &mut Outbox {
+        &mut self.outbox
     }
 
     fn next_deadline(&self) -> Option<Moment> {

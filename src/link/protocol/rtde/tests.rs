@@ -8,8 +8,9 @@ use super::packet::{
 use super::{Rtde, RtdeOptions};
 use crate::link::protocol::outbox::MAX_JOINTS;
 use crate::link::protocol::rest::RestDetector;
-use crate::link::protocol::{Failure, JointState, Protocol as _, ProtocolEvent};
+use crate::link::protocol::{Failure, Protocol as _, ProtocolEvent};
 use crate::link::simulator::bench::fuzz::{Bounds, assert_hangs_up_once, fuzz_protocol, fuzz_simulator};
+use crate::link::simulator::bench::robots::joint_states;
 use crate::link::simulator::bench::streams::assert_splits_change_nothing;
 use crate::link::simulator::bench::{Bench, START, Tape};
 use crate::link::simulator::fault::Planned;
@@ -27,16 +28,6 @@ fn ready(faults: &[Planned<RtdeFault>]) -> RtdeBench {
     let events = bench.settle();
     assert!(matches!(events.last(), Some(ProtocolEvent::Ready(_))), "{events:?}");
     bench
-}
-
-fn joints(events: &[ProtocolEvent]) -> Vec<&JointState> {
-    let mut states = Vec::new();
-    for event in events {
-        if let ProtocolEvent::Joints(state) = event {
-            states.push(state);
-        }
-    }
-    states
 }
 
 fn decode(bytes: &[u8]) -> Packet {
@@ -113,7 +104,7 @@ fn values_stand_in_the_order_in_which_they_were_asked_for() {
 fn the_stream_brings_the_joints_of_the_robot_at_the_frequency_that_was_asked_for() {
     let mut bench = ready(&[]);
     let events = bench.run_for(Duration::from_secs(2));
-    let states = joints(&events);
+    let states = joint_states(&events);
     assert_eq!((events.len(), states.len()), (50, 50));
     for state in states {
         assert_eq!(state.positions, bench.cell.joints.positions);
@@ -133,7 +124,7 @@ fn a_frequency_beyond_the_limits_is_taken_to_the_limit() {
     let slow = Rtde::new(RtdeOptions { frequency: 1.0, ..RtdeOptions::default() });
     let mut bench = Bench::new(slow, RtdeSimulator::new(Vec::new()));
     bench.settle();
-    assert_eq!(joints(&bench.run_for(Duration::from_secs(10))).len(), 10);
+    assert_eq!(joint_states(&bench.run_for(Duration::from_secs(10))).len(), 10);
 }
 
 #[test]
@@ -188,9 +179,9 @@ fn faults_of_the_stream_lose_the_link_and_a_new_connection_is_good() {
         let events = bench.run_until(|event| matches!(event, ProtocolEvent::Lost(_)));
         let Some(ProtocolEvent::Lost(failure)) = events.last() else { panic!("{fault}: {events:?}") };
         assert_eq!(failure.to_string(), words);
-        assert_eq!(joints(&events).len(), 9, "{fault}");
+        assert_eq!(joint_states(&events).len(), 9, "{fault}");
         assert!(matches!(bench.settle().last(), Some(ProtocolEvent::Ready(_))), "{fault}");
-        assert_eq!(joints(&bench.run_for(Duration::from_secs(1))).len(), 25, "{fault}");
+        assert_eq!(joint_states(&bench.run_for(Duration::from_secs(1))).len(), 25, "{fault}");
     }
 }
 
@@ -198,10 +189,10 @@ fn faults_of_the_stream_lose_the_link_and_a_new_connection_is_good() {
 fn data_of_another_recipe_are_skipped_and_count_as_silence() {
     let mut bench = ready(&[Planned::always(RtdeFault::WrongRecipe)]);
     let events = bench.run_until(|event| matches!(event, ProtocolEvent::Lost(_)));
-    assert_eq!(joints(&events).len(), 0);
+    assert_eq!(joint_states(&events).len(), 0);
     assert!(matches!(events.last(), Some(ProtocolEvent::Lost(Failure::Silent { .. }))));
     let mut bench = ready(&[Planned::from(RtdeFault::WrongRecipe, 2, 1)]);
-    assert_eq!(joints(&bench.run_for(Duration::from_secs(1))).len(), 24);
+    assert_eq!(joint_states(&bench.run_for(Duration::from_secs(1))).len(), 24);
 }
 
 #[test]
@@ -219,9 +210,9 @@ fn a_stop_a_mode_and_a_broken_number_are_said_and_the_stream_goes_on() {
             _ => None,
         });
         assert_eq!(said.collect::<Vec<_>>(), expected);
-        let stopped = joints(&events).iter().filter(|state| state.stopped.is_some()).count();
+        let stopped = joint_states(&events).iter().filter(|state| state.stopped.is_some()).count();
         assert_eq!(stopped, if fault == RtdeFault::ProtectiveStop { 5 } else { 0 });
-        assert_eq!(joints(&events).len(), states, "{fault}");
+        assert_eq!(joint_states(&events).len(), states, "{fault}");
     }
 }
 
@@ -229,7 +220,7 @@ fn a_stop_a_mode_and_a_broken_number_are_said_and_the_stream_goes_on() {
 fn drip_and_a_flood_of_messages_change_nothing() {
     for fault in [RtdeFault::Drip, RtdeFault::TextFlood] {
         let mut bench = ready(&[Planned::once(fault)]);
-        assert_eq!(joints(&bench.run_for(Duration::from_secs(2))).len(), 50, "{fault}");
+        assert_eq!(joint_states(&bench.run_for(Duration::from_secs(2))).len(), 50, "{fault}");
     }
 }
 
@@ -238,7 +229,7 @@ fn a_robot_is_at_rest_half_a_second_after_it_stopped() {
     let mut bench = ready(&[Planned::from(RtdeFault::Moving, 11, 10), Planned::always(RtdeFault::NoisySpeeds)]);
     let events = bench.run_for(Duration::from_secs(3));
     let mut rest_detector = RestDetector::default();
-    let states = joints(&events);
+    let states = joint_states(&events);
     let rests: Vec<bool> = states.iter().map(|state| rest_detector.feed(state)).collect();
     // 25 Hz: ten states at rest, ten moving, number 19 is the first that stays, and 13 intervals are more than 0.5 s.
     assert_eq!(rests.iter().position(|rest| *rest), Some(32));
@@ -255,7 +246,7 @@ fn states_with_a_person_in_the_cell_can_be_measured_and_are_kept_as_a_remark() {
     ] {
         let mut bench = ready(&[Planned::always(fault)]);
         let events = bench.run_for(Duration::from_secs(1));
-        for state in joints(&events) {
+        for state in joint_states(&events) {
             assert_eq!((&state.stopped, state.remark.as_deref()), (&None, Some(words)));
         }
         let said = format!("safety status: {words}");
@@ -279,14 +270,14 @@ fn older_controllers_are_asked_for_less_and_their_safety_mode_serves_as_well() {
     let first = "timestamp,actual_q,robot_mode,safety_status";
     assert_eq!(asked(&old), [first, "timestamp,actual_q,robot_mode,safety_mode"]);
     let events = old.run_for(Duration::from_secs(1));
-    assert!(joints(&events).iter().all(|state| state.remark.as_deref() == Some("reduced (2)")), "{events:?}");
+    assert!(joint_states(&events).iter().all(|state| state.remark.as_deref() == Some("reduced (2)")), "{events:?}");
     let mut bench = bench(&[Planned::always(RtdeFault::NoModes), Planned::always(RtdeFault::Safeguard)]);
     let Some(ProtocolEvent::Ready(identity)) = bench.settle().pop() else { panic!() };
     assert_eq!(asked(&bench), [first, "timestamp,actual_q,safety_mode", "timestamp,actual_q"]);
     assert!(identity.notes.iter().any(|note| note.contains("does not report its safety state")), "{identity:?}");
     assert_eq!(identity.checked[1], "values of the controller: timestamp, actual_q");
     let events = bench.run_for(Duration::from_secs(1));
-    assert_eq!(joints(&events).len(), 25);
+    assert_eq!(joint_states(&events).len(), 25);
 }
 
 #[test]
@@ -294,11 +285,11 @@ fn zeros_between_joint_values_are_dropped_and_a_robot_at_zero_is_believed() {
     let mut bench = ready(&[Planned::from(RtdeFault::Dropout, 10, 3)]);
     let events = bench.run_for(Duration::from_secs(1));
     let here = &bench.cell.joints.positions;
-    assert_eq!(joints(&events).len(), 22);
-    assert!(joints(&events).iter().all(|state| state.positions == *here), "{events:?}");
+    assert_eq!(joint_states(&events).len(), 22);
+    assert!(joint_states(&events).iter().all(|state| state.positions == *here), "{events:?}");
     let mut bench = ready(&[Planned::from(RtdeFault::Dropout, 10, u32::MAX)]);
     let events = bench.run_for(Duration::from_secs(3));
-    let states = joints(&events);
+    let states = joint_states(&events);
     assert_eq!(states.len(), 75 - 25);
     assert!(states[49].positions.iter().all(|value| *value == 0.0));
 }
@@ -316,7 +307,7 @@ fn splits_change_nothing() {
     for tape in [tape().joined(), tape()] {
         let events = assert_splits_change_nothing(Rtde::default, &tape);
         assert!(matches!(events.first(), Some(ProtocolEvent::Ready(_))));
-        assert!(!joints(&events).is_empty(), "{events:?}");
+        assert!(!joint_states(&events).is_empty(), "{events:?}");
         assert!(matches!(events.last(), Some(ProtocolEvent::Failed(_))));
     }
 }

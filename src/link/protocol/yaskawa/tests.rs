@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use super::{Answer, HEADER, MAX_CONTENT, PULSES, Yaskawa, YaskawaOptions, request};
-use crate::link::protocol::{Failure, JointState, ProtocolEvent};
+use crate::link::protocol::{Failure, ProtocolEvent};
 use crate::link::simulator::bench::fuzz::{Bounds, fuzz_protocol, fuzz_simulator};
+use crate::link::simulator::bench::robots::joint_states;
 use crate::link::simulator::bench::streams::assert_splits_change_nothing;
 use crate::link::simulator::bench::{Bench, hex};
 use crate::link::simulator::fault::Planned;
@@ -18,12 +19,6 @@ fn driver() -> Yaskawa {
 
 fn bench(faults: &[Planned<YaskawaFault>]) -> YaskawaBench {
     Bench::new(driver(), YaskawaSimulator::new(faults.to_vec()))
-}
-
-fn joints(events: &[ProtocolEvent]) -> Vec<&JointState> {
-    let states =
-        events.iter().filter_map(|event| if let ProtocolEvent::Joints(state) = event { Some(state) } else { None });
-    states.collect()
 }
 
 /// The bytes that public clients send and expect.
@@ -64,7 +59,7 @@ fn the_joints_of_the_robot_arrive_many_times_a_second() {
     let Some(ProtocolEvent::Ready(identity)) = bench.settle().pop() else { panic!() };
     assert_eq!(identity.name, "Yaskawa controller, SIMULATED");
     let events = bench.run_for(Duration::from_secs(2));
-    let states = joints(&events);
+    let states = joint_states(&events);
     assert!((30..45).contains(&states.len()), "{}", states.len());
     for state in states {
         for ((a, b), scale) in state.positions.iter().zip(&bench.cell.joints.positions).zip(PULSES_PER_DEGREE) {
@@ -82,12 +77,7 @@ fn faults_are_said_and_a_new_connection_is_good() {
         (YaskawaFault::HugeAnswer, "65000 bytes"),
         (YaskawaFault::NoMagic, "does not begin with YERC"),
     ] {
-        let mut bench = bench(&[Planned::at(fault, 10)]);
-        bench.settle();
-        let events = bench.run_until(|event| matches!(event, ProtocolEvent::Lost(_)));
-        let Some(ProtocolEvent::Lost(failure)) = events.last() else { panic!("{fault}: {events:?}") };
-        assert!(failure.to_string().contains(part), "{fault}: {failure}");
-        assert!(matches!(bench.settle().last(), Some(ProtocolEvent::Ready(_))), "{fault}");
+        bench(&[Planned::at(fault, 10)]).assert_loss_is_said(&fault, part);
     }
     // What is lost on the way is asked for again, and only silence ends the link.
     for fault in [YaskawaFault::Lost, YaskawaFault::WrongNumber, YaskawaFault::Truncated] {
@@ -95,7 +85,7 @@ fn faults_are_said_and_a_new_connection_is_good() {
         bench.settle();
         let events = bench.run_for(Duration::from_secs(3));
         assert!(!format!("{events:?}").contains("Lost"), "{fault}: {events:?}");
-        assert!(joints(&events).len() > 20, "{fault}");
+        assert!(joint_states(&events).len() > 20, "{fault}");
     }
     let mut silent = bench(&[Planned::from(YaskawaFault::Lost, 5, 1000)]);
     silent.settle();
@@ -121,7 +111,7 @@ fn conversation() -> YaskawaBench {
 #[test]
 fn splits_change_nothing() {
     let events = assert_splits_change_nothing(driver, &conversation().tape);
-    assert!(joints(&events).len() > 3, "{events:?}");
+    assert!(joint_states(&events).len() > 3, "{events:?}");
 }
 
 #[test]

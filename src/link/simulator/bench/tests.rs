@@ -92,8 +92,8 @@ impl Protocol for Toy {
         }
     }
 
-    fn next_event(&mut self) -> Option<ProtocolEvent> {
-        self.outbox.next_event()
+    fn outbox(&mut self) -> &mut Outbox {
+        &mut self.outbox
     }
 
     fn next_deadline(&self) -> Option<Moment> {
