@@ -19,6 +19,8 @@ pub(crate) mod pty;
 pub(crate) mod reference_case;
 #[cfg(unix)]
 pub(crate) mod small_disk;
+#[cfg(target_os = "linux")]
+pub(crate) mod technician;
 
 /// Path of the program under test.
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_trupose");

@@ -9,15 +9,14 @@ use std::time::Duration;
 
 use crate::support::PROGRAM;
 use crate::support::place::Place;
-use crate::support::pty::{CTRL_U, ENTER, PATIENCE, Shown, Terminal};
+use crate::support::pty::{ENTER, PATIENCE, Shown};
+use crate::support::technician::{LONG, Technician};
 use trupose::session::journal::Entry;
 use trupose::session::state::Session;
 use trupose::store::session::read_journal;
 
 /// A search for poses on a busy machine.
 const PLANNING: Duration = Duration::from_mins(4);
-/// A measurement, a reconnection or an identification on a busy machine.
-const LONG: Duration = Duration::from_mins(1);
 
 /// A tracker and a robot, until this is dropped. The robot goes where it is told.
 struct Cell {
@@ -51,43 +50,6 @@ impl Drop for Cell {
     fn drop(&mut self) {
         drop(self.child.kill());
         drop(self.child.wait());
-    }
-}
-
-struct Technician {
-    terminal: Terminal,
-    keys: usize,
-}
-
-impl Technician {
-    fn press(&mut self, keys: &str) {
-        self.keys += keys.chars().count();
-        self.terminal.send(keys);
-    }
-
-    /// Fills the fields of a form; `None` leaves one as it is.
-    fn fill(&mut self, values: &[Option<&str>]) {
-        for (index, value) in values.iter().enumerate() {
-            if index > 0 {
-                self.press("\t");
-            }
-            if let Some(value) = value {
-                self.press(&format!("{CTRL_U}{value}"));
-            }
-        }
-        self.press(ENTER);
-    }
-
-    #[track_caller]
-    fn sees(&self, patience: Duration, what: &str, condition: impl FnMut(&Shown) -> bool) {
-        assert!(self.terminal.comes(patience, condition), "{what} does not come:\n{}", self.terminal.text());
-    }
-
-    /// Presses a key when the screen offers it, and waits for what it does.
-    #[track_caller]
-    fn does(&mut self, keys: &str, what: &str, condition: impl FnMut(&Shown) -> bool) {
-        self.press(keys);
-        self.sees(LONG, what, condition);
     }
 }
 
@@ -139,26 +101,11 @@ fn session(place: &Place) -> Session {
 #[ignore = "passes alone, but not always beside all other tests, which take its processor"]
 fn a_technician_measures_over_a_wire_whatever_goes_wrong() {
     let place = Place::new();
-    let terminal = Terminal::start(place.0.path(), &["wizard"], (80, 24));
-    terminal.wait_for_step(1);
-    let mut technician = Technician { terminal, keys: 0 };
-
-    // The data sheet; the mistyped dimension is seen at the flange.
-    technician.does("d", "the form", |shown| shown.has("from the drawing in its data sheet"));
-    let limits = Some("165, -110..110, -110..70, 160, 120, 180");
-    let lengths = [Some("290"), Some("0"), Some("720"), Some("70"), Some("302"), Some("72"), Some("0")];
-    technician.fill(&[&[Some("Maker 6/0.6"), None], &lengths[..], &[limits]].concat());
-    technician.sees(PATIENCE, "the wrong flange", |shown| shown.has("(374.0, 0.0, 1080.0) mm"));
-    technician.does("d", "the form", |shown| shown.has("from the drawing in its data sheet"));
-    technician.fill(&[None, None, None, None, Some("270")]);
-    technician.sees(PATIENCE, "the flange", |shown| shown.has("(374.0, 0.0, 630.0) mm"));
-    technician.does(ENTER, "step 2", |shown| shown.step() == Some(2));
+    let mut technician = Technician::start(&place);
+    technician.describes_an_arm();
 
     // The tracker on the network; the simulated one has the same arm in front of it.
-    technician.does("j", "the cell", |shown| shown.has("This cell."));
-    technician.press("\u{1b}[C\t\t\t");
-    technician.fill(&[None, Some("2500 0 700"), None, None, Some("0.3"), Some("0.8")]);
-    technician.sees(PATIENCE, "the accuracy", |shown| shown.has("Leica AT9xx"));
+    technician.describes_the_cell();
     let journal = read_journal(&folder_of(&place).unwrap()).unwrap();
     let profile = journal.lines.iter().find_map(|line| match &line.entry {
         Entry::Profile { text, .. } => Some(text.clone()),
@@ -175,8 +122,7 @@ fn a_technician_measures_over_a_wire_whatever_goes_wrong() {
     technician.sees(LONG, "the tracker", |shown| shown.has("answers") && !shown.has("cancel connecting"));
     // A moment passes between the answer and the first point.
     technician.sees(LONG, "a point", |shown| shown.has("sees "));
-    technician.keys += 1;
-    technician.terminal.send_until("n", "step 3", |shown| shown.step() == Some(3));
+    technician.presses_until("n", "step 3", |shown| shown.step() == Some(3));
     technician.does("p", "the choice", |shown| shown.has("chosen       as the profile says"));
     technician.does("n", "step 4", |shown| shown.step() == Some(4));
     technician.press("18\u{1b}[B10\u{1b}[B120\u{1b}[B\u{1b}[B0");

@@ -8,6 +8,7 @@ use std::time::Duration;
 use crate::support::PROGRAM;
 use crate::support::place::Place;
 use crate::support::pty::{CTRL_U, CTRL_Z, ENTER, PATIENCE, Shown, Terminal, processor_seconds};
+use crate::support::technician::Technician;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use trupose::session::journal::Entry;
@@ -400,67 +401,14 @@ fn garbage_does_not_make_it_fail() {
     outcome.unwrap();
 }
 
-/// Keys of a technician, counted.
-struct Technician {
-    terminal: Terminal,
-    keys: usize,
-}
-
-impl Technician {
-    fn press(&mut self, keys: &str) {
-        self.keys += keys.chars().count();
-        self.terminal.send(keys);
-    }
-
-    /// Fills the fields of a form; `None` leaves one as it is.
-    fn fill(&mut self, values: &[Option<&str>]) {
-        for (index, value) in values.iter().enumerate() {
-            if index > 0 {
-                self.press("\t");
-            }
-            if let Some(value) = value {
-                self.press(&format!("{CTRL_U}{value}"));
-            }
-        }
-        self.press(ENTER);
-    }
-
-    fn presses_until(&mut self, keys: &str, what: &str, condition: impl FnMut(&Shown) -> bool) {
-        self.keys += keys.chars().count();
-        self.terminal.send_until(keys, what, condition);
-    }
-}
-
 /// An arm that is not in the list, from its data sheet to a corrected program: with an exchanged pose, a bad reading and a beam that
 /// breaks, answered as the screen proposes.
 #[test]
 fn a_technician_without_a_profile_calibrates_by_keys() {
     let place = Place::new();
-    let terminal = Terminal::start(place.0.path(), &["wizard"], SIZE);
-    terminal.wait_for_step(1);
-    let mut technician = Technician { terminal, keys: 0 };
-
-    // The data sheet; a mistyped dimension is seen at the flange and corrected.
-    technician.press("d");
-    technician.terminal.wait_for_text("from the drawing in its data sheet");
-    let limits = Some("165, -110..110, -110..70, 160, 120, 180");
-    let lengths = [Some("290"), Some("0"), Some("720"), Some("70"), Some("302"), Some("72"), Some("0")];
-    technician.fill(&[&[Some("Maker 6/0.6"), None], &lengths[..], &[limits]].concat());
-    technician.terminal.wait_for_text("(374.0, 0.0, 1080.0) mm");
-    technician.press("d");
-    technician.terminal.wait_for_text("from the drawing in its data sheet");
-    technician.fill(&[None, None, None, None, Some("270")]);
-    technician.terminal.wait_for_text("(374.0, 0.0, 630.0) mm");
-    technician.press(ENTER);
-    technician.terminal.wait_for_step(2);
-
-    // The cell: accuracy from the list, place of the tracker, limits of the verdict.
-    technician.press("j");
-    technician.terminal.wait_for_text("This cell.");
-    technician.press("\u{1b}[C");
-    technician.press("\t\t\t");
-    technician.fill(&[None, Some("2500 0 700"), None, None, Some("0.3"), Some("0.8")]);
-    technician.terminal.wait_for_text("Leica AT9xx");
+    let mut technician = Technician::start(&place);
+    technician.describes_an_arm();
+    technician.describes_the_cell();
     technician.press("\u{1b}[B\u{1b}[B\u{1b}[B\u{1b}[B");
     technician.press(ENTER);
     technician.terminal.wait_for_text("hidden errors of the arm");
