@@ -98,7 +98,6 @@ fn session(place: &Place) -> Session {
 /// exchanged, one is missed, and the connection drops.
 #[expect(clippy::too_many_lines, reason = "one day of a technician")]
 #[test]
-#[ignore = "passes alone, but not always beside all other tests, which take its processor"]
 fn a_technician_measures_over_a_wire_whatever_goes_wrong() {
     let place = Place::new();
     let mut technician = Technician::start(&place);
