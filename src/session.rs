@@ -14,6 +14,7 @@ pub mod calibration;
 pub mod comparison;
 pub mod constraints;
 pub mod corrected;
+pub mod decision;
 pub mod export;
 pub mod filter;
 pub mod health;

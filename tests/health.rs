@@ -128,6 +128,8 @@ fn provenance() -> Provenance {
         robot: String::new(),
         profile_sha256: String::new(),
         inputs: Vec::new(),
+        serial: String::new(),
+        instrument_serial: String::new(),
     }
 }
 

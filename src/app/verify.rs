@@ -20,7 +20,9 @@ use crate::report;
 use crate::session::calibration::{Calibration, SampleText};
 use crate::session::measurements::Row;
 use crate::session::set_up::PayloadText;
-use crate::session::summary::{InputRole, ModelSummary, Refit, SCHEMA, VerificationReport, Warning, WarningCode};
+use crate::session::summary::{
+    InputRole, ModelSummary, Provenance, Refit, SCHEMA, VerificationReport, Warning, WarningCode,
+};
 use crate::text;
 use crate::units::{MICROMETRE, MILLIMETRE, to_mm};
 
@@ -115,8 +117,12 @@ pub(super) fn run<O: Write, E: Write>(args: &VerifyArgs, console: &mut Console<O
     let inputs = vec![input_file(InputRole::Calibration, file, text.as_bytes()), measured.input];
     let report = VerificationReport {
         schema: SCHEMA,
-        provenance: provenance(profile, &calibration.profile, load::now(), inputs),
-        verdict: verdict(profile.acceptance(), Ok(&verification), &warnings),
+        provenance: Provenance {
+            serial: calibration.provenance.serial.clone(),
+            instrument_serial: calibration.provenance.instrument_serial.clone(),
+            ..provenance(profile, &calibration.profile, load::now(), inputs)
+        },
+        verdict: verdict(profile.acceptance(), Ok(&verification), &warnings, &calibration.sigma),
         warnings,
         verification,
     };

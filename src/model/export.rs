@@ -103,7 +103,7 @@ impl CalibratedArm {
         let mut about = vec![
             format!("Identified geometry of '{}'", profile.title()),
             format!("profile {}, calibrated with {}", profile.name(), provenance.program),
-            format!("verdict on the calibration: {}", words(calibration.verdict.status)),
+            format!("verdict on the calibration: {}", calibration.verdict.word().to_lowercase()),
         ];
         about.extend(cautions.iter().map(|caution| format!("WARNING: {caution}")));
         let untold = untold(calibration, profile.chain().dof());
@@ -128,14 +128,6 @@ impl CalibratedArm {
 
     fn limits(&self) -> Vec<Option<(f64, f64)>> {
         self.profile.joints().iter().map(|range| range.limits).collect()
-    }
-}
-
-const fn words(status: VerdictStatus) -> &'static str {
-    match status {
-        VerdictStatus::Accepted => "accepted",
-        VerdictStatus::NotAccepted => "NOT ACCEPTED",
-        VerdictStatus::NotEvaluated => "not evaluated",
     }
 }
 

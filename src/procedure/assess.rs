@@ -9,9 +9,10 @@ use crate::kinematics::{Joint, Place};
 use crate::profile::Acceptance;
 use crate::report::number;
 use crate::session::advice::Advice;
+use crate::session::decision::{self, Outcome};
 use crate::session::summary::{
-    AxisSummary, Figure, JointBin, JointSummary, LimitCheck, LimitedQuantity, ModelSummary, Refit, StatisticsSummary,
-    Verdict, VerdictStatus, VerificationSummary, Warning, WarningCode,
+    AxisSummary, Figure, JointBin, JointSummary, LimitCheck, LimitedQuantity, ModelSummary, Refit, SigmaSummary,
+    StatisticsSummary, Verdict, VerdictStatus, VerificationSummary, Warning, WarningCode,
 };
 use crate::units::to_mm;
 
@@ -190,8 +191,10 @@ pub(crate) fn verdict(
     acceptance: &Acceptance,
     verification: Result<&VerificationSummary, Advice>,
     warnings: &[Warning],
+    sigma: &SigmaSummary,
 ) -> Verdict {
-    let decided = |status, reasons: Vec<String>, checks| Verdict { status, reasons, checks, advice: None };
+    let decided =
+        |status, reasons: Vec<String>, checks| Verdict { status, reasons, checks, undecided: Vec::new(), advice: None };
     let verification = match verification {
         Ok(verification) => verification,
         Err(advice) => {
@@ -242,7 +245,17 @@ pub(crate) fn verdict(
     } else {
         format!("all {count} acceptance limits are met")
     };
-    decided(VerdictStatus::Accepted, vec![reason], checks)
+    let undecided: Vec<LimitedQuantity> = decision::decided(&checks, sigma)
+        .into_iter()
+        .filter(|limit| limit.outcome != Outcome::Pass)
+        .map(|limit| limit.quantity)
+        .collect();
+    let mut reasons = vec![reason];
+    if !undecided.is_empty() {
+        let which: Vec<String> = undecided.iter().map(|quantity| quantity.words()).collect();
+        reasons.push(format!("not with the uncertainty of the figure (k = 2): {}", which.join(", ")));
+    }
+    Verdict { undecided, ..decided(VerdictStatus::Accepted, reasons, checks) }
 }
 
 /// Compares every limit of the profile with the errors found. The distance of a seat from its shared point is a position error.
@@ -304,16 +317,42 @@ mod tests {
         }
     }
 
+    fn sigma(used_mm: f64) -> SigmaSummary {
+        SigmaSummary {
+            used_mm,
+            source: crate::identification::SigmaSource::Option,
+            from_residuals_mm: None,
+            instrument_mm: None,
+            shots_mm: None,
+            poses_mm: None,
+        }
+    }
+
+    #[test]
+    fn a_limit_within_the_uncertainty_is_undecided_in_every_word() {
+        let acceptance = Acceptance { distance_rms: Some(2e-4), ..Acceptance::default() };
+        let mut found = of(Some(0.15));
+        found.identified.distance_mm.as_mut().unwrap().rms_interval = Some([0.14, 0.16]);
+        let decided = |sigma_mm| verdict(&acceptance, Ok(&found), &[], &sigma(sigma_mm));
+        assert_eq!(decided(0.01).word(), "ACCEPTED");
+        // U of two ends of 30 µm each: 85 µm.
+        let open = decided(0.03);
+        assert_eq!((open.word(), open.status), ("UNDECIDED", VerdictStatus::Accepted));
+        assert_eq!(open.undecided, [LimitedQuantity::DistanceRms]);
+        assert_eq!(open.reasons[1], "not with the uncertainty of the figure (k = 2): distance rms");
+    }
+
     #[test]
     fn limits_that_cannot_be_evaluated_are_never_accepted() {
         let acceptance = Acceptance { position_rms: Some(2e-4), distance_rms: Some(2e-4), ..Acceptance::default() };
-        let status = |distance, warnings: &[Warning]| verdict(&acceptance, Ok(&of(distance)), warnings).status;
+        let status =
+            |distance, warnings: &[Warning]| verdict(&acceptance, Ok(&of(distance)), warnings, &sigma(0.01)).status;
         assert_eq!(status(Some(0.1), &[]), VerdictStatus::Accepted);
         assert_eq!(status(None, &[]), VerdictStatus::NotEvaluated);
         assert_eq!(status(Some(0.3), &[]), VerdictStatus::NotAccepted);
         assert_eq!(status(Some(f64::NAN), &[]), VerdictStatus::NotAccepted);
         let twice = [Warning::new(WarningCode::PoorData, "", true), Warning::new(WarningCode::PoorData, "", true)];
-        let found = verdict(&acceptance, Ok(&of(None)), &twice);
+        let found = verdict(&acceptance, Ok(&of(None)), &twice, &sigma(0.01));
         assert_eq!(found.status, VerdictStatus::NotAccepted);
         assert_eq!(found.reasons, ["see the warning 'poor_data'", "these data cannot show: distance rms"]);
     }

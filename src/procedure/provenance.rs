@@ -18,5 +18,7 @@ pub(crate) fn provenance(profile: &Profile, profile_text: &str, created: String,
         robot: profile.title().to_owned(),
         profile_sha256: sha256(profile_text.as_bytes()),
         inputs,
+        serial: String::new(),
+        instrument_serial: String::new(),
     }
 }

@@ -151,7 +151,9 @@ impl Finished<'_> {
             &found.observability;
         let has_points = !request.identification.samples.is_empty();
         let advice = if has_points { Advice::VerifyPoints } else { Advice::VerifyDistances };
-        let verdict: Verdict = assess::verdict(profile.acceptance(), verification.as_ref().ok_or(advice), &warnings);
+        let sigma = sigma_summary(found);
+        let verdict: Verdict =
+            assess::verdict(profile.acceptance(), verification.as_ref().ok_or(advice), &warnings, &sigma);
         IdentificationSummary {
             schema: SCHEMA,
             provenance: provenance(profile, &request.profile_text, request.created.clone(), request.inputs.clone()),
@@ -165,7 +167,7 @@ impl Finished<'_> {
             condition_number: *condition_number,
             condition_number_mm_rad: *condition_number_raw,
             condition_number_points: *scored_points,
-            sigma: sigma_summary(found),
+            sigma,
             parameters: parameter_summaries(found, settings.prior),
             settings,
             blind_groups: groups

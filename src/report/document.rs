@@ -8,7 +8,7 @@ mod build;
 mod decision;
 mod decisions;
 
-pub(super) use decision::{DecisionPart, LimitDecision, Outcome};
+pub(super) use decision::DecisionPart;
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
 

@@ -6,10 +6,9 @@ use crate::identification::{Estimator, Shape, SigmaSource, TerminationReason};
 use crate::session::joint_errors::{CurveMarks, curve_drawn, curve_scale, shares_sentence, workspace_sentence};
 use crate::session::summary::{
     FeatureSummary, IdentificationSummary, JointErrorSummary, JointSummary, ORIENTATION_SENTENCE, ParameterSummary,
-    Provenance, SelectionSummary, StatisticsSummary, Verdict, VerdictStatus, VerificationReport, VerificationSummary,
-    Warning,
+    Provenance, SelectionSummary, StatisticsSummary, Verdict, VerificationReport, VerificationSummary, Warning,
 };
-use crate::text::{counted, decimals_for, fixed};
+use crate::text::{counted, decimals_for, fixed, printable};
 
 /// Share of the expected deviation above which a standard deviation says that the data hardly determined a parameter.
 const WEAK: f64 = 0.5;
@@ -18,7 +17,7 @@ const WEAK: f64 = 0.5;
 pub fn identification_text(summary: &IdentificationSummary) -> String {
     let mut text = title("Identification", &summary.provenance);
     text.push_str(&warnings(&summary.warnings));
-    text.push_str(&verdict(&summary.verdict));
+    text.push_str(&verdict(&summary.verdict, &summary.provenance));
     if let Some(verification) = &summary.verification {
         text.push_str(&verification_tables(verification));
     }
@@ -52,7 +51,7 @@ pub fn identification_text(summary: &IdentificationSummary) -> String {
 pub fn verification_text(report: &VerificationReport) -> String {
     let mut text = title("Verification", &report.provenance);
     text.push_str(&warnings(&report.warnings));
-    text.push_str(&verdict(&report.verdict));
+    text.push_str(&verdict(&report.verdict, &report.provenance));
     text.push_str(&verification_tables(&report.verification));
     text.push_str(&joint_lines(&report.verification.residual_by_joint));
     text
@@ -80,13 +79,9 @@ pub(super) fn warnings(warnings: &[Warning]) -> String {
     text
 }
 
-fn verdict(verdict: &Verdict) -> String {
-    let name = match verdict.status {
-        VerdictStatus::Accepted => "ACCEPTED",
-        VerdictStatus::NotAccepted => "NOT ACCEPTED",
-        VerdictStatus::NotEvaluated => "NOT EVALUATED",
-    };
-    let mut text = paragraph("", &format!("Verdict: {name}: {}", verdict.reasons.join("; ")));
+fn verdict(verdict: &Verdict, provenance: &Provenance) -> String {
+    let mut text = paragraph("", &format!("Verdict: {}: {}", verdict.word(), verdict.reasons.join("; ")));
+    text.push_str(&paragraph("", &printable(&provenance.belongs_to())));
     for check in &verdict.checks {
         let (sign, result) = match check.met {
             Some(true) => ("<=", "met"),

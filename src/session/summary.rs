@@ -35,6 +35,27 @@ pub struct Provenance {
     pub profile_sha256: String,
     /// Files that were read.
     pub inputs: Vec<InputFile>,
+    /// Serial number of the arm; empty: not given.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub serial: String,
+    /// Serial number of the instrument; empty: not given.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub instrument_serial: String,
+}
+
+impl Provenance {
+    /// Says which arm a verdict is about.
+    pub fn belongs_to(&self) -> String {
+        if self.serial.is_empty() {
+            return "No serial number was given: this verdict belongs to no arm.".to_owned();
+        }
+        let instrument = if self.instrument_serial.is_empty() {
+            String::new()
+        } else {
+            format!(", measured with the instrument {}", self.instrument_serial)
+        };
+        format!("For the arm with serial number {}{instrument}.", self.serial)
+    }
 }
 
 /// Role of an input file.
@@ -471,12 +492,25 @@ pub struct Verdict {
     pub status: VerdictStatus,
     pub reasons: Vec<String>,
     pub checks: Vec<LimitCheck>,
+    /// Limits that are met, but not with the uncertainty of the figure; none unless everything else is accepted.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub undecided: Vec<LimitedQuantity>,
     /// Advice on how to get another verdict; taken by [`Verdict::put_into_words`].
     #[serde(skip)]
     pub advice: Option<Advice>,
 }
 
 impl Verdict {
+    /// The verdict in capitals, the same wherever it is shown.
+    pub const fn word(&self) -> &'static str {
+        match self.status {
+            VerdictStatus::Accepted if self.undecided.is_empty() => "ACCEPTED",
+            VerdictStatus::Accepted => "UNDECIDED",
+            VerdictStatus::NotAccepted => "NOT ACCEPTED",
+            VerdictStatus::NotEvaluated => "NOT EVALUATED",
+        }
+    }
+
     /// Appends the advice to the reasons in the words of the module that shows it.
     pub fn put_into_words(&mut self, words: impl Fn(Advice) -> String) {
         if let (Some(advice), Some(reason)) = (self.advice.take(), self.reasons.last_mut()) {

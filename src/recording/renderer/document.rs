@@ -13,7 +13,7 @@ use crate::session::journal::IdentifiedText;
 use crate::session::plan::PoseKind;
 use crate::session::plan_summary::PlanSummary;
 use crate::session::state::Session;
-use crate::session::summary::{ModelSummary, StatisticsSummary, VerdictStatus};
+use crate::session::summary::{ModelSummary, StatisticsSummary};
 use crate::text::{counted, fixed};
 use crate::units::to_mm;
 
@@ -134,14 +134,6 @@ pub(super) fn errors_in_words(judged: &[Judged<'_>], of_verification: bool) -> S
     }
 }
 
-const fn verdict(status: VerdictStatus) -> &'static str {
-    match status {
-        VerdictStatus::Accepted => "ACCEPTED",
-        VerdictStatus::NotAccepted => "NOT ACCEPTED",
-        VerdictStatus::NotEvaluated => "NOT EVALUATED",
-    }
-}
-
 /// Draws the report on a plan: which rules rejected how many candidates.
 pub(super) fn plan_report(canvas: &mut Canvas, plan: &PlanSummary) {
     let found = &plan.candidates;
@@ -159,13 +151,13 @@ pub(super) fn plan_report(canvas: &mut Canvas, plan: &PlanSummary) {
 pub(super) fn verdict_in_words(identified: &IdentifiedText) -> String {
     let verdict = &identified.summary.verdict;
     let reason = verdict.reasons.first().map_or_else(String::new, |reason| format!(": {reason}"));
-    format!("**{}**{reason}", self::verdict(verdict.status))
+    format!("**{}**{reason}", verdict.word())
 }
 
 /// Returns the result in one line, and below it what the figures are about.
 fn result_headline(session: &Session, identified: &IdentifiedText) -> String {
     let summary = &identified.summary;
-    let verdict = verdict(summary.verdict.status);
+    let verdict = summary.verdict.word();
     let figures = summary.verification.as_ref().and_then(|verification| {
         let mean =
             |model: &ModelSummary| model.errors().into_iter().find_map(|(name, found)| Some((name, found?.mean)));
@@ -196,7 +188,7 @@ pub(super) fn result(canvas: &mut Canvas, session: &Session, identified: &Identi
         .with_component_from_data("robot", text(&summary.provenance.robot))
         .with_component_from_data("profile", text(&summary.provenance.profile))
         .with_component_from_data("profile_sha256", text(&summary.provenance.profile_sha256))
-        .with_component_from_data("verdict", text(&verdict(summary.verdict.status).to_lowercase()))
+        .with_component_from_data("verdict", text(&summary.verdict.word().to_lowercase()))
         .with_component_from_data("identified", text(&time.to_string()));
     canvas.draw_static(names::RESULT_PROPERTIES, &about);
     headline(canvas, &result_headline(session, identified));
@@ -210,7 +202,7 @@ fn markdown(session: &Session, identified: &IdentifiedText, time: Timestamp) -> 
         page.push_str(&text);
         page.push('\n');
     };
-    line(format!("# {}: {}\n", robot(session), verdict(summary.verdict.status)));
+    line(format!("# {}: {}\n", robot(session), summary.verdict.word()));
     line(format!("{}, {time}\n", summary.provenance.robot));
     for reason in &summary.verdict.reasons {
         line(format!("* {reason}"));

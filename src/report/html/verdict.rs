@@ -4,9 +4,8 @@ use super::charts::{LISTED, MOST, against_joints, norm, of_kind, per_pose, sprea
 use super::markup::{Column, NONE, add, escape, list, number, optional, paragraph, table};
 use super::pair;
 use super::views::views;
-use crate::report::document::{
-    DecisionPart, Details, Document, LimitDecision, Outcome, PointOrigin, PointPart, ResultState,
-};
+use crate::report::document::{DecisionPart, Details, Document, PointOrigin, PointPart, ResultState};
+use crate::session::decision::{LimitDecision, Outcome};
 use crate::session::joint_errors::workspace_sentence;
 use crate::session::summary::{
     Figure, IdentificationSummary, LimitedQuantity, ModelSummary, ORIENTATION_SENTENCE, StatisticsSummary,
@@ -35,7 +34,8 @@ pub(super) fn section(document: &Document) -> String {
     };
     let simulated = if report.points_from == PointOrigin::Simulated { " (simulated)" } else { "" };
     let mut reasons: Vec<String> = result.verdict.reasons.iter().map(|reason| escape(reason)).collect();
-    if outcome == Outcome::Undecided {
+    // Results of earlier versions do not say it themselves.
+    if outcome == Outcome::Undecided && result.verdict.undecided.is_empty() {
         reasons.push("at least one limit is within the uncertainty of the figure".to_owned());
     }
     if report.state == ResultState::OutOfDate {

@@ -4,7 +4,7 @@ use super::entry::{Correction, Decision, Entry, MeasuredText, PlanText};
 use crate::session::about::About;
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, Step, TargetChoice};
-use crate::session::summary::{IdentificationSummary, StatisticsSummary, VerdictStatus};
+use crate::session::summary::{IdentificationSummary, StatisticsSummary};
 use crate::session::wire::LinkChoice;
 
 impl Entry {
@@ -152,12 +152,7 @@ fn result_text(summary: &IdentificationSummary, is_usable: bool) -> String {
         position(&verification.nominal.position_mm),
         position(&verification.identified.position_mm)
     );
-    let verdict = match summary.verdict.status {
-        VerdictStatus::Accepted => "accepted",
-        VerdictStatus::NotAccepted => "NOT accepted",
-        VerdictStatus::NotEvaluated => "not evaluated",
-    };
-    format!("{text}{verified}; {verdict}")
+    format!("{text}{verified}; {}", summary.verdict.word().to_lowercase())
 }
 
 fn about_text(about: &About) -> String {

@@ -182,6 +182,7 @@ fn verdict(status: VerdictStatus) -> Verdict {
         reasons: vec![
             if is_met { "both limits are met" } else { "position max is 1.2000 mm, allowed is 1.000 mm" }.to_owned(),
         ],
+        undecided: Vec::new(),
         checks: vec![
             check(LimitedQuantity::PositionMean, 0.0103, 0.4),
             check(LimitedQuantity::PositionMax, if is_met { 0.0199 } else { 1.2 }, 1.0),
@@ -253,6 +254,8 @@ fn summary(is_good: bool) -> IdentificationSummary {
             robot: SOOCHOW.title().to_owned(),
             profile_sha256: String::new(),
             inputs: Vec::new(),
+            serial: String::new(),
+            instrument_serial: String::new(),
         },
         settings: IdentificationSettings {
             level: Level::Geometric,

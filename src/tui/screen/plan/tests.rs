@@ -28,6 +28,8 @@ fn summary() -> PlanSummary {
         robot: "Soochow".to_owned(),
         profile_sha256: String::new(),
         inputs: Vec::new(),
+        serial: String::new(),
+        instrument_serial: String::new(),
     };
     PlanSummary {
         schema: SCHEMA,

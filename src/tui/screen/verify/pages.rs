@@ -21,7 +21,7 @@ pub(super) fn accuracy(content: &VerifyView, page: &mut Page) {
     }
     if let Some(verdict) = &content.verdict {
         if let Some(verification) = &content.verification {
-            page.paragraph(&sentence(verification, verdict), role_of(verdict.status));
+            page.paragraph(&sentence(verification, verdict), role_of(verdict));
         }
         status(verdict, "see below", page);
         limits(verdict, page);
@@ -62,9 +62,10 @@ fn sentence(verification: &VerificationSummary, verdict: &Verdict) -> String {
 }
 
 /// The colour of a verdict.
-const fn role_of(status: VerdictStatus) -> Role {
-    match status {
-        VerdictStatus::Accepted => Role::Ok,
+const fn role_of(verdict: &Verdict) -> Role {
+    match verdict.status {
+        VerdictStatus::Accepted if verdict.undecided.is_empty() => Role::Ok,
+        VerdictStatus::Accepted => Role::Warn,
         VerdictStatus::NotAccepted => Role::Alarm,
         VerdictStatus::NotEvaluated => Role::Warn,
     }
@@ -75,11 +76,7 @@ const BY_CODE: &str = "see the warning '";
 
 /// The verdict in words. `place` says where the warnings can be read, because their codes are shown nowhere.
 pub(in crate::tui::screen) fn status(verdict: &Verdict, place: &str, page: &mut Page) {
-    let mark = match verdict.status {
-        VerdictStatus::Accepted => "ACCEPTED: ",
-        VerdictStatus::NotAccepted => "NOT ACCEPTED: ",
-        VerdictStatus::NotEvaluated => "NOT EVALUATED: ",
-    };
+    let mark = format!("{}: ", verdict.word());
     let by_code = verdict.reasons.iter().filter(|reason| reason.starts_with(BY_CODE)).count();
     let mut reasons: Vec<String> =
         verdict.reasons.iter().filter(|reason| !reason.starts_with(BY_CODE)).cloned().collect();
@@ -87,7 +84,7 @@ pub(in crate::tui::screen) fn status(verdict: &Verdict, place: &str, page: &mut 
         let verb = if by_code == 1 { "rules" } else { "rule" };
         reasons.push(format!("{} {verb} it out, {place}", counted(by_code, "warning")));
     }
-    page.marked((mark, role_of(verdict.status)), &reasons.join("; "), Role::Plain);
+    page.marked((&mark, role_of(verdict)), &reasons.join("; "), Role::Plain);
 }
 
 fn limits(verdict: &Verdict, page: &mut Page) {
