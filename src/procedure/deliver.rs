@@ -39,9 +39,6 @@ pub fn data_files(session: &Session) -> Result<Vec<(String, String)>, String> {
     ];
     files.extend(export::drift_csv(session, robot).map(|text| ("drift.csv".to_owned(), text)));
     if let Some(calibration) = session.identified.as_ref().and_then(|result| result.calibration.as_ref()) {
-        let mut calibration = calibration.clone();
-        calibration.provenance.serial.clone_from(&session.about.serial);
-        calibration.provenance.instrument_serial.clone_from(&session.about.instrument_serial);
         files.push(("calibration.ron".to_owned(), calibration.to_text().map_err(|error| error.to_string())?));
     }
     Ok(files)

@@ -325,11 +325,13 @@ impl Session {
             Entry::Note { pose, text } => self.note(line.time, pose.clone(), text.clone()),
             Entry::About(about) => {
                 self.about = about.clone();
+                self.name_the_arm();
                 // The report on disk says something else.
                 self.delivered.clear();
             }
             Entry::Identified(result) => {
                 self.identified = Some(result.clone());
+                self.name_the_arm();
                 self.has_result = true;
                 // Files of an earlier result are not those of this one.
                 self.delivered.clear();
@@ -372,6 +374,16 @@ impl Session {
         self.last_stop = None;
         self.plan = None;
         self.robot_program = None;
+    }
+
+    /// Copies the serial numbers into the result, which may be older than they are.
+    fn name_the_arm(&mut self) {
+        let Some(result) = &mut self.identified else { return };
+        let of_calibration = result.calibration.as_mut().map(|calibration| &mut calibration.provenance);
+        for provenance in of_calibration.into_iter().chain([&mut result.summary.provenance]) {
+            provenance.serial.clone_from(&self.about.serial);
+            provenance.instrument_serial.clone_from(&self.about.instrument_serial);
+        }
     }
 
     /// Puts a cell into the profile. A result from before does not know it.
