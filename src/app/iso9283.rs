@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3};
 use super::{Console, load, to_json};
 use crate::cli::iso9283::{EvaluateArgs, Iso9283Command, TestPlanArgs};
 use crate::error::{ExitStatus, Failure};
-use crate::kinematics::{Arm, Place};
+use crate::kinematics::Arm;
 use crate::procedure::iso9283::{Reading, TestError, TestPlanRequest, TestRequest, evaluate, plan};
 use crate::procedure::{input_file, joint_types, provenance};
 use crate::report;
@@ -115,8 +115,7 @@ fn figures<O: Write, E: Write>(args: &EvaluateArgs, console: &mut Console<O, E>)
         .zip(load::samples(&rows, &loaded.profile)?)
         .map(|(row, sample)| {
             let label = row.pose.parse().map_err(|source| TestError::Label { line: row.line, source })?;
-            let at = Place { configuration: sample.at.configuration, target: sample.at.target };
-            Ok(Reading { label, at, point: sample.point })
+            Ok(Reading { label, sample })
         })
         .collect::<Result<Vec<_>, TestError>>()
         .map_err(|error| failure(&error))?;

@@ -25,9 +25,8 @@ use thiserror::Error;
 
 pub use describe::{correction_text, instrument_text, target_text};
 pub use entry::{
-    CirclePointText, Correction, Decision, Entry, FindingCause, FindingText, IdentifiedText, JointCheckPointText,
-    MeasuredText, PairText, PlanText, PlannedText, PointErrorText, RobotProgramText, from_edge, from_xyz_mm, to_edge,
-    to_length_mm, to_xyz_mm,
+    Correction, Decision, Entry, FindingCause, FindingText, IdentifiedText, JointPointText, MeasuredText, PairText,
+    PlanText, PlannedText, PointErrorText, RobotProgramText, from_edge, from_xyz_mm, to_edge, to_length_mm, to_xyz_mm,
 };
 
 use crate::text::{printable, shortened};

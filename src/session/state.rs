@@ -19,8 +19,8 @@ use super::about::About;
 use super::calibration::{MountedText, mounted_on};
 use super::corrected::CorrectedText;
 use super::journal::{
-    CirclePointText, Decision, Entry, FindingText, IdentifiedText, JointCheckPointText, Journal, Line, MeasuredText,
-    PlanText, PlannedText, RobotProgramText, from_edge, from_xyz_mm, to_xyz_mm,
+    Decision, Entry, FindingText, IdentifiedText, JointPointText, Journal, Line, MeasuredText, PlanText, PlannedText,
+    RobotProgramText, from_edge, from_xyz_mm, to_xyz_mm,
 };
 use super::plan::{PlannedPose, PoseKind};
 use super::set_up::{InstrumentChoice, PayloadText, Step, TargetChoice};
@@ -63,9 +63,9 @@ pub struct Session {
     /// When the acceptance limits were set, if not by the profile.
     pub limits_set: Option<LimitsSet>,
     /// Points of the circle-point analysis.
-    pub circle_points: Vec<CirclePointText>,
+    pub circle_points: Vec<JointPointText<usize>>,
     /// Points of the joint check.
-    pub joint_check: Vec<JointCheckPointText>,
+    pub joint_check: Vec<JointPointText<Option<usize>>>,
     /// All rows of all plans, in the order of the programs.
     pub rows: Vec<Row>,
     /// Plans that were accepted, without their rows.
@@ -524,7 +524,7 @@ impl Session {
     }
 
     /// A point of the circles in the tracker frame (m), corrections applied.
-    pub fn point_of_circle(&self, point: &CirclePointText) -> Point3<f64> {
+    pub fn point_of_circle(&self, point: &JointPointText<usize>) -> Point3<f64> {
         from_xyz_mm(point.xyz_mm) * self.correction_of(point.number)
     }
 

@@ -25,7 +25,9 @@ use crate::session::summary::{IdentificationSummary, Verdict, VerificationSummar
 use crate::session::wire::{KnownLinks, LinkChoice};
 use crate::units::to_mm;
 pub use joint_check::{JointCheckRow, JointCheckVerdict, JointCheckView};
-pub use rows::{ExpectedView, MeasuredRow, ProposedPointView, ProposedState, ProposedView, RowState, RowView};
+pub use rows::{
+    ExpectedView, MeasuredRow, ProposedPointView, ProposedState, ProposedView, RowState, RowView, SampleView,
+};
 pub use sessions::{SessionCard, SessionChoice};
 
 /// Content of a screen.
@@ -479,20 +481,6 @@ pub enum MoveCheck {
     /// The arm is there.
     #[default]
     Arrived,
-}
-
-/// A summary of a sample.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct SampleView {
-    /// Number of the measurement.
-    pub measurement: u64,
-    pub pose: String,
-    /// Measured point in the tracker frame.
-    pub xyz_mm: [f64; 3],
-    /// Scatter of the shots.
-    pub scatter_mm: Option<f64>,
-    /// Whether the sample counts.
-    pub counts: bool,
 }
 
 /// The finding to decide about.

@@ -6,11 +6,12 @@ use nalgebra::{Isometry3, Point3};
 
 use super::TestError;
 use crate::geometry::register;
+use crate::identification::PointSample;
 use crate::iso9283::{
     CYCLES, DIRECTIONS, DistanceFigures, Estimate, Label, POSES, PoseFigures, barycentre, distance_figures, drift,
     multi_directional_variation, pose_figures,
 };
-use crate::kinematics::{Arm, Place};
+use crate::kinematics::Arm;
 use crate::session::iso9283::{
     AccuracyMm, DirectionRow, DistanceRow, EstimateMm, FrameSource, PoseRow, SCHEMA, TestSummary,
 };
@@ -26,10 +27,8 @@ const BLOCK: usize = 10;
 pub struct Reading {
     /// Pose and cycle.
     pub label: Label,
-    /// Configuration that was commanded, and target.
-    pub at: Place,
-    /// Attained point in the frame of the instrument (m).
-    pub point: Point3<f64>,
+    /// The commanded place and the attained point.
+    pub sample: PointSample,
 }
 
 /// A test to evaluate.
@@ -118,11 +117,11 @@ impl<'a> Side<'a> {
 
     /// Where this arm says that the commanded configurations are: their mean, as all are meant to be the same.
     fn commanded(&self, readings: &BTreeMap<usize, &Reading>) -> Point3<f64> {
-        barycentre(readings.values().map(|reading| self.arm.point_in_base(&reading.at)))
+        barycentre(readings.values().map(|reading| self.arm.point_in_base(&reading.sample.at)))
     }
 
     fn attained(&self, reading: &Reading) -> Point3<f64> {
-        self.base_from_station * reading.point
+        self.base_from_station * reading.sample.point
     }
 
     fn pose(&self, readings: &BTreeMap<usize, &Reading>) -> Option<PoseFigures> {
@@ -142,7 +141,7 @@ fn fitted(arm: &Arm, groups: &Groups<'_>) -> Option<Isometry3<f64>> {
     let here = Side { arm, base_from_station: Isometry3::identity() };
     let of = |pose: usize| {
         let readings = groups.of(pose)?;
-        Some((1.0, barycentre(readings.values().map(|reading| reading.point)), here.commanded(readings)))
+        Some((1.0, barycentre(readings.values().map(|reading| reading.sample.point)), here.commanded(readings)))
     };
     let pairs: Vec<_> = (1..=POSES).filter_map(of).collect();
     (pairs.len() >= 3).then(|| register(pairs.into_iter()))?.map(|registration| registration.to_from_from)
@@ -189,7 +188,7 @@ fn directions(groups: &Groups<'_>) -> Vec<DirectionRow> {
         let attained = |direction| groups.0.get(&(pose, Some(direction)));
         let barycentres: Option<Vec<_>> = (1..=DIRECTIONS)
             .map(|direction| {
-                attained(direction).map(|readings| barycentre(readings.values().map(|reading| reading.point)))
+                attained(direction).map(|readings| barycentre(readings.values().map(|reading| reading.sample.point)))
             })
             .collect();
         let variation = multi_directional_variation(&barycentres?)?;

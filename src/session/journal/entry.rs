@@ -51,7 +51,7 @@ pub enum Entry {
     /// What the operator states about the cell; it replaces what the profile says.
     Cell(CellText),
     /// A point of the circle-point analysis.
-    CirclePoint(CirclePointText),
+    CirclePoint(JointPointText<usize>),
     /// The points of the circle-point analysis are to be measured again.
     CirclesDiscarded,
     /// Poses to measure; those of an earlier plan that are not measured yet are dropped.
@@ -96,7 +96,7 @@ pub enum Entry {
         what: String,
     },
     /// A point of the joint check.
-    JointCheckPoint(JointCheckPointText),
+    JointCheckPoint(JointPointText<Option<usize>>),
     /// The joint check is to be measured again.
     JointCheckDiscarded,
     /// The operator selected this row of the plan, from 0.
@@ -162,27 +162,13 @@ pub struct RobotProgramText {
     pub was_driven: bool,
 }
 
-/// A point of the circle-point analysis.
+/// A point measured while one joint is turned: `J` is that joint, from 0, or none where all are at their start.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CirclePointText {
+pub struct JointPointText<J> {
     /// Number of the measurement in the session.
     pub number: u64,
-    /// Joint that is turned, from 0.
-    pub joint: usize,
-    /// Pendant joint values.
-    pub joints: Vec<f64>,
-    /// Measured point in the tracker frame.
-    pub xyz_mm: (f64, f64, f64),
-}
-
-/// A point of the joint check.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct JointCheckPointText {
-    /// Number of the measurement in the session.
-    pub number: u64,
-    /// Joint that is turned, from 0; none at the pose where the check begins.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub joint: Option<usize>,
+    /// Joint that is turned.
+    pub joint: J,
     /// Pendant joint values.
     pub joints: Vec<f64>,
     /// Measured point in the tracker frame.

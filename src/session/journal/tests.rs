@@ -252,17 +252,17 @@ fn all_entries() -> Vec<Entry> {
     let mut entries = vec![
         opened(),
         Entry::Profile { source: TRICKY.to_owned(), sha256: "00".to_owned(), text: builtin("ur5").unwrap().to_owned() },
-        Entry::CirclePoint(CirclePointText { number: 1, joint: 5, joints: vec![1.0, 2.0], xyz_mm: (1.0, 2.0, 3.0) }),
+        Entry::CirclePoint(JointPointText { number: 1, joint: 5, joints: vec![1.0, 2.0], xyz_mm: (1.0, 2.0, 3.0) }),
         Entry::CirclesDiscarded,
         Entry::Undone { line: 4, what: TRICKY.to_owned() },
         Entry::Redone { line: 4, what: String::new() },
-        Entry::JointCheckPoint(JointCheckPointText {
+        Entry::JointCheckPoint(JointPointText {
             number: 1,
             joint: None,
             joints: vec![1.0, 2.0],
             xyz_mm: (1.0, 2.0, 3.0),
         }),
-        Entry::JointCheckPoint(JointCheckPointText {
+        Entry::JointCheckPoint(JointPointText {
             number: 2,
             joint: Some(1),
             joints: vec![1.0, 12.0],

@@ -11,7 +11,7 @@ use super::plan::measuring_pace;
 use super::{Action, Condition, Cx, StepMachine, offer, require, with_default};
 use crate::identification::circle_point::{CirclePointError, CircleSeries, MeasuredArm, TargetLocation, locate_target};
 use crate::profile::{FREE_TARGET_UNCERTAINTY, Level};
-use crate::session::journal::{CirclePointText, Entry, from_edge, from_xyz_mm, target_text, to_edge, to_xyz_mm};
+use crate::session::journal::{Entry, JointPointText, from_edge, from_xyz_mm, target_text, to_edge, to_xyz_mm};
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice, PayloadText, Step, TargetChoice};
 use crate::session::state::{Robot, Session};
@@ -90,7 +90,7 @@ impl TargetStep {
             ];
         }
         let joints = reading.configuration.as_deref().unwrap_or(next.configuration);
-        vec![Action::Write(vec![Entry::CirclePoint(CirclePointText {
+        vec![Action::Write(vec![Entry::CirclePoint(JointPointText {
             number,
             joint: next.joint,
             joints: to_edge(joints, &robot.joint_types),

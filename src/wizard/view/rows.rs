@@ -4,6 +4,21 @@ use serde::Serialize;
 
 use crate::session::plan::PoseKind;
 
+/// A sample in short.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SampleView {
+    /// Number of the measurement.
+    pub measurement: u64,
+    /// Name of its pose.
+    pub pose: String,
+    /// Measured point in the tracker frame, corrections applied.
+    pub xyz_mm: [f64; 3],
+    /// Scatter of the shots.
+    pub scatter_mm: Option<f64>,
+    /// Whether the sample counts.
+    pub counts: bool,
+}
+
 /// A row of the plan.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RowView {
@@ -38,14 +53,12 @@ pub struct ExpectedView {
 pub struct MeasuredRow {
     /// Distance from where the identified arm has it, or the nominal one (see [`super::CaptureView::fit_is_nominal`]).
     pub fit_mm: Option<f64>,
-    pub scatter_mm: Option<f64>,
     pub shots: u32,
     /// Time of day (UTC), `09:15`.
     pub time: String,
-    /// Number of the measurement.
-    pub measurement: u64,
-    /// Measured point in the tracker frame, corrections applied.
-    pub xyz_mm: [f64; 3],
+    /// The sample itself.
+    #[serde(flatten)]
+    pub sample: SampleView,
     /// Findings about it, resolved ones included.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<String>,

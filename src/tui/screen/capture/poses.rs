@@ -55,7 +55,7 @@ fn sample_cells(row: &RowView, worst: f64, theme: Theme) -> Vec<String> {
     vec![
         number(measured.fit_mm),
         theme.glyphs.bar_done().repeat(length),
-        number(measured.scatter_mm),
+        number(measured.sample.scatter_mm),
         measured.shots.to_string(),
         format!("{}{note}", measured.time),
     ]
@@ -80,7 +80,7 @@ pub(super) fn draw(
         .map(|row| {
             let is_shown = Some(row.row) == content.row;
             let is_asked = content.finding.as_ref().is_some_and(|finding| {
-                row.measured.as_ref().is_some_and(|measured| measured.measurement == finding.measurement)
+                row.measured.as_ref().is_some_and(|measured| measured.sample.measurement == finding.measurement)
             }) && row.state == RowState::Measured;
             let (role, word) = match row.state {
                 RowState::Measured if is_asked => (Role::Warn, format!("{} in question", theme.glyphs.doubt())),
@@ -115,7 +115,7 @@ fn detail(theme: Theme, content: &CaptureView, row: &RowView, area: Rect, buf: &
     let mut lines = vec![(Role::Title, format!("Pose {}: {}", row.pose, joints.join("  ")))];
     match &row.measured {
         Some(measured) => {
-            let [x, y, z] = measured.xyz_mm;
+            let [x, y, z] = measured.sample.xyz_mm;
             let to = if content.fit_is_nominal { "from the nominal arm" } else { "from the identified arm" };
             let fit = measured.fit_mm.map_or_else(String::new, |fit| format!(", {fit:.3} mm {to}"));
             let again = match measured.earlier {
@@ -124,7 +124,7 @@ fn detail(theme: Theme, content: &CaptureView, row: &RowView, area: Rect, buf: &
             };
             lines.push((
                 Role::Plain,
-                format!("measurement {}: x {x:.3}  y {y:.3}  z {z:.3} mm{fit}{again}", measured.measurement),
+                format!("measurement {}: x {x:.3}  y {y:.3}  z {z:.3} mm{fit}{again}", measured.sample.measurement),
             ));
             lines.extend(measured.findings.iter().map(|finding| (Role::Warn, finding.clone())));
         }

@@ -37,11 +37,15 @@ fn rows() -> Vec<RowView> {
         },
         measured: (row < 15 && row != 5).then(|| MeasuredRow {
             fit_mm: (row < 10).then_some(0.01 * ((row * 7) % 10) as f64),
-            scatter_mm: Some(0.004),
             shots: 3,
             time: format!("09:{row:02}"),
-            measurement: row as u64,
-            xyz_mm: [1234.5678, -345.6789, 987.6543],
+            sample: SampleView {
+                measurement: row as u64,
+                pose: row.to_string(),
+                xyz_mm: [1234.5678, -345.6789, 987.6543],
+                scatter_mm: Some(0.004),
+                counts: row != 7,
+            },
             findings: Vec::new(),
             earlier: usize::from(row == 4),
         }),

@@ -36,7 +36,7 @@ pub(super) fn view(step: &CaptureStep, cx: &Cx<'_>) -> CaptureView {
         predicted_point_in_base_mm: step
             .row
             .and_then(|row| session.rows.get(row)?.planned.point_in_base)
-            .map(|point| [to_mm(point.x), to_mm(point.y), to_mm(point.z)]),
+            .map(|point| [point.x, point.y, point.z].map(to_mm)),
         measured,
         open,
         skipped: session.rows.iter().filter(|row| row.active && row.skipped).count(),
@@ -130,15 +130,12 @@ fn row_view(session: &Session, index: usize, fits: &Fits) -> Option<RowView> {
 fn measured_row(session: &Session, sample: &Sample, fits: &Fits) -> MeasuredRow {
     let number = sample.noted.number;
     let findings = session.samples.iter().flat_map(|sample| &sample.noted.findings);
-    let point = session.point_of(sample);
     MeasuredRow {
         fit_mm: fits.of(session, sample),
-        scatter_mm: sample.noted.scatter_mm,
         shots: sample.noted.shots,
         // `2026-03-01T09:15:02Z`
         time: sample.time.to_string().get(11..16).unwrap_or_default().to_owned(),
-        measurement: number,
-        xyz_mm: [point.x, point.y, point.z].map(to_mm),
+        sample: sample_view(session, sample),
         findings: findings.filter(|finding| finding.about == number).map(|finding| finding.message.clone()).collect(),
         earlier: session.samples.iter().filter(|other| other.row == sample.row && other.noted.number < number).count(),
     }
@@ -212,7 +209,7 @@ fn sample_view(session: &Session, sample: &Sample) -> SampleView {
     SampleView {
         measurement: sample.noted.number,
         pose: session.pose_of(sample).to_owned(),
-        xyz_mm: [to_mm(point.x), to_mm(point.y), to_mm(point.z)],
+        xyz_mm: [point.x, point.y, point.z].map(to_mm),
         scatter_mm: sample.noted.scatter_mm,
         counts: sample.state == SampleState::Counts,
     }

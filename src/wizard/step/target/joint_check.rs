@@ -4,7 +4,7 @@ use super::{Action, Condition, Cx, require};
 use crate::identification::joint_check::{CheckedStop, JointCheck, JointFault, JointSeen, check_joints};
 use crate::kinematics::Joint;
 use crate::profile::{FREE_TARGET_UNCERTAINTY, Profile, builtin};
-use crate::session::journal::{Entry, JointCheckPointText, from_edge, from_xyz_mm, to_edge, to_xyz_mm};
+use crate::session::journal::{Entry, JointPointText, from_edge, from_xyz_mm, to_edge, to_xyz_mm};
 use crate::session::reading::{MeasureRequest, Reading};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
 use crate::session::state::{Robot, Session};
@@ -69,7 +69,7 @@ pub(super) fn take(plan: &[JointCheckStop], reading: &Reading, cx: &Cx<'_>) -> V
         return vec![Action::Write(vec![Entry::Refused { number, pose, reason, xyz_mm: None }]), Action::Say(notice)];
     }
     let joints = reading.configuration.as_deref().unwrap_or(&stop.configuration);
-    vec![Action::Write(vec![Entry::JointCheckPoint(JointCheckPointText {
+    vec![Action::Write(vec![Entry::JointCheckPoint(JointPointText {
         number,
         joint: stop.joint,
         joints: to_edge(joints, &robot.joint_types),
