@@ -14,12 +14,10 @@ mod table_import;
 mod architecture;
 mod cartesian;
 mod cartesian_programs;
-mod cell;
 mod cli;
 mod compensate;
 mod contacts;
 mod docs;
-mod estimation;
 mod example;
 #[cfg(unix)]
 mod faults;

@@ -12,7 +12,6 @@ pub(crate) mod faulty_session;
 pub(crate) mod invented;
 pub(crate) mod paper_case;
 pub(crate) mod place;
-pub(crate) mod point_cloud;
 #[cfg(target_os = "linux")]
 #[expect(dead_code, reason = "the benchmark of the terminal uses the rest")]
 pub(crate) mod pty;

@@ -34,7 +34,7 @@ use trupose::wizard::{
 };
 
 /// Streams of events, where `TRUPOSE_WIZARD_SEEDS` does not ask for more.
-const SEEDS: u64 = 16;
+const SEEDS: u64 = 4;
 /// Events of a stream.
 const EVENTS: usize = 10_000;
 
