@@ -8,6 +8,8 @@ use crate::units::{Quantity, to_mm};
 const EITHER: f64 = 0.1;
 /// A first explanation this likely needs no "perhaps".
 const SURE: f64 = 0.9;
+/// Beyond this many times the expected deviation the number says nothing.
+const NOT_AT_ALL: f64 = 1000.0;
 
 /// How samples, planned poses and joints are called on the screen.
 pub struct Names<'a> {
@@ -80,7 +82,9 @@ impl Finding {
             [only] => format!("most likely {only}"),
             stories => format!("either {}", stories.join(", or ")),
         };
-        format!("{sample} does not fit ({}): {told}; {}", self.how_far(names), self.advice(names))
+        // How many thousand times too far says nothing more.
+        let fit = if self.ratio > NOT_AT_ALL { "does not fit at all" } else { "does not fit" };
+        format!("{sample} {fit} ({}): {told}; {}", self.how_far(names), self.advice(names))
     }
 
     fn story(&self, sample: usize, cause: &Cause, names: &Names<'_>) -> String {
@@ -98,7 +102,10 @@ impl Finding {
     }
 
     fn how_far(&self, names: &Names<'_>) -> String {
-        let ratio = format!("{:.0} times the expected deviation", self.ratio);
+        let ratio = match self.ratio {
+            ratio if ratio > NOT_AT_ALL => format!("more than {NOT_AT_ALL:.0} times the expected deviation"),
+            ratio => format!("{ratio:.0} times the expected deviation"),
+        };
         match self.worst.first() {
             Some(pair) => {
                 let sign = if pair.deviation > 0.0 { "longer" } else { "shorter" };
