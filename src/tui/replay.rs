@@ -63,6 +63,8 @@ pub struct Replay {
     /// The session up to that entry.
     session: Session,
     is_playing: bool,
+    /// Whether the page of keys is open.
+    has_help: bool,
     speed: usize,
     page: Page,
     scroll: usize,
@@ -89,6 +91,7 @@ impl Replay {
             place: 0,
             session: Session::default(),
             is_playing: false,
+            has_help: false,
             speed: 2,
             page: Page::default(),
             scroll: 0,
@@ -137,7 +140,11 @@ impl Replay {
     }
 
     pub fn on_key(&mut self, key: Key) -> ReplayCommand {
+        let was_open = std::mem::take(&mut self.has_help);
         match key.code {
+            KeyCode::Char('?') => self.has_help = !was_open,
+            // As in the wizard, any key closes the page, and the program is left from the picture.
+            KeyCode::Esc | KeyCode::Enter | KeyCode::Char('q') if was_open => {}
             KeyCode::Char('z') if key.has_modifier() => return ReplayCommand::Suspend,
             KeyCode::Char('l') if key.has_modifier() => return ReplayCommand::Redraw,
             KeyCode::Char('c') if key.has_modifier() => return ReplayCommand::Quit,

@@ -12,7 +12,7 @@ use crate::tui::glyphs::shortened;
 use crate::tui::keymap::KeyHint;
 use crate::tui::preview::Preview;
 use crate::tui::theme::Role;
-use crate::tui::{frame, paint};
+use crate::tui::{frame, help, paint};
 use crate::units::to_mm;
 
 /// Largest number of lines for the entry in words.
@@ -41,6 +41,10 @@ impl Replay {
             row += 1;
         }
         let content = paint::band(area, row + 1, bottom.saturating_sub(row + 1));
+        if self.has_help {
+            help::draw_keys(&self.all_keys(), theme, content, buf);
+            return;
+        }
         match self.page {
             Page::Robot => self.robot(content, buf),
             Page::Samples | Page::Result => {
@@ -65,6 +69,7 @@ impl Replay {
             KeyHint::new("Home/End", "first, last", 3),
             KeyHint::new("+/-", "speed", 4),
             KeyHint::new("Tab", next, 2),
+            KeyHint::new("?", "help", 1),
             KeyHint::new("q", "quit", 1),
         ];
         match self.page {
@@ -72,6 +77,27 @@ impl Replay {
             Page::Samples | Page::Result => items.push(KeyHint::new("PgUp/PgDn", "scroll", 5)),
         }
         items
+    }
+
+    /// Every key with what it does, for the help. The arrows step through time here, so the picture turns by others.
+    fn all_keys(&self) -> Vec<KeyHint> {
+        [
+            ("Space", if self.is_playing { "pause" } else { "play, from the start at the end" }),
+            ("Left/Right", "one entry of the journal back or on"),
+            ("Home/End", "first or last entry"),
+            ("+/-", "play faster or slower"),
+            ("Tab", "robot, samples, result"),
+            ("PgUp/PgDn", "scroll samples and result"),
+            ("< >", "turn the picture left or right"),
+            ("Up/Down", "look from higher or lower"),
+            ("z Z", "zoom in or out"),
+            ("v", "view: arm, all, reflector"),
+            ("o", "perspective or parallel"),
+            ("0", "reset the view"),
+            ("q", "quit"),
+        ]
+        .map(|(key, label)| KeyHint::new(key, label, 0))
+        .into()
     }
 
     fn header(&self, area: Rect, buf: &mut Buffer) {

@@ -87,6 +87,10 @@ fn a_session_is_seen_at_every_entry() {
     assert_eq!(replay.session().samples.len(), 7);
     insta::assert_snapshot!("capture", drawn(&replay, 80, 24));
     insta::assert_snapshot!("capture_large", drawn(&replay, 120, 40));
+    press(&mut replay, KeyCode::Char('?'));
+    insta::assert_snapshot!("help", drawn(&replay, 80, 24));
+    assert_eq!(press(&mut replay, KeyCode::Char('q')), ReplayCommand::Draw);
+    assert!(!replay.has_help);
     press(&mut replay, KeyCode::Tab);
     insta::assert_snapshot!("samples", drawn(&replay, 80, 24));
     press(&mut replay, KeyCode::Tab);
