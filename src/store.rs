@@ -94,6 +94,31 @@ pub fn read(path: &Path) -> Result<Vec<u8>, StoreError> {
     read().map_err(|source| StoreError::Read { path: path.to_owned(), source })
 }
 
+/// The names that a path begun can be completed to, folders with a slash, in order; and the longest beginning that they share.
+/// A folder that cannot be read has none.
+pub fn completions(begun: &str) -> (String, Vec<String>) {
+    let (folder, name) = begun.rfind('/').map_or(("", begun), |slash| begun.split_at(slash + 1));
+    let folder_path = if folder.is_empty() { Path::new(".") } else { Path::new(folder) };
+    let entries = fs::read_dir(folder_path).map(|entries| entries.filter_map(Result::ok).collect()).unwrap_or_default();
+    let entries: Vec<fs::DirEntry> = entries;
+    let mut names: Vec<String> = entries
+        .iter()
+        .filter_map(|entry| {
+            let text = entry.file_name().into_string().ok()?;
+            // Hidden files are offered to those who ask for them.
+            let is_meant = text.starts_with(name) && (!text.starts_with('.') || name.starts_with('.'));
+            let end = if entry.path().is_dir() { "/" } else { "" };
+            is_meant.then(|| format!("{text}{end}"))
+        })
+        .collect();
+    names.sort_unstable();
+    let shared = names.iter().skip(1).fold(names.first().cloned(), |shared, next| {
+        let shared: String = shared?.chars().zip(next.chars()).take_while(|(a, b)| a == b).map(|(a, _)| a).collect();
+        Some(shared)
+    });
+    (shared.map_or_else(|| begun.to_owned(), |shared| format!("{folder}{shared}")), names)
+}
+
 /// Creates a folder and its parents.
 ///
 /// # Errors
@@ -292,6 +317,22 @@ fn temporary<'a>() -> tempfile::Builder<'a, 'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn paths_are_completed_as_far_as_they_are_certain() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = |name: &str| format!("{}/{name}", folder.path().display());
+        for name in ["plan.csv", "plan-2.csv", ".hidden", "other.csv"] {
+            fs::write(inside(name), "").unwrap();
+        }
+        fs::create_dir(inside("programs")).unwrap();
+        let (text, names) = completions(&inside("pl"));
+        assert_eq!((text, names), (inside("plan"), vec!["plan-2.csv".to_owned(), "plan.csv".to_owned()]));
+        assert_eq!(completions(&inside("pr")), (inside("programs/"), vec!["programs/".to_owned()]));
+        assert_eq!(completions(&inside("")).1, ["other.csv", "plan-2.csv", "plan.csv", "programs/"]);
+        assert_eq!(completions(&inside(".h")).0, inside(".hidden"));
+        assert_eq!(completions(&inside("none/x")), (inside("none/x"), Vec::new()));
+    }
 
     #[test]
     fn replacing_keeps_either_the_old_or_the_new_text() {

@@ -15,12 +15,13 @@ use ratatui::layout::Rect;
 pub use form::{Build, Form, Take, Taken};
 pub use plain::Answered;
 
-use super::form::{ChoiceList, FieldOutcome, NumberField, TextField};
+use super::form::{ChoiceList, Completion, FieldOutcome, NumberField, TextField};
 use super::keymap::{Key, KeyHint};
 use super::paint;
 use super::theme::{Role, Theme};
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
 use crate::session::simulation::{Simulation, Truth};
+use crate::store;
 use crate::text::wrapped;
 use crate::wizard::view::{Content, RowState, RowView, ViewModel};
 use crate::wizard::{Danger, Intent, IntentInfo};
@@ -86,11 +87,14 @@ impl Dialog {
         let text = |label: &str, value: &str, intent: fn(String) -> Intent| {
             Some(Self::Text { field: TextField::new(label, value).proposed(), intent })
         };
+        let path = |label: &str, value: &str, intent: fn(String) -> Intent| {
+            Some(Self::Text { field: TextField::new(label, value).proposed().path(completed), intent })
+        };
         match &info.intent {
             Intent::ChooseProfile(_) => choose_profile(view),
             Intent::ChooseInstrument(_) => Some(choose_instrument(view)),
             Intent::NameSession(proposal) => text("Name of the session", proposal, Intent::NameSession),
-            Intent::LoadPlan(proposal) => text("File with the poses (CSV)", proposal, Intent::LoadPlan),
+            Intent::LoadPlan(proposal) => path("File with the poses (CSV)", proposal, Intent::LoadPlan),
             Intent::TypeReading(_) => Some(ask::coordinates(view, "")),
             Intent::StatePayload(payload) => Some(ask::payload(payload)),
             Intent::About(about) => Some(ask::about(about)),
@@ -110,7 +114,7 @@ impl Dialog {
             Intent::Exclude(_) => choose_pose(view, |state| state == RowState::Measured, Intent::Exclude),
             Intent::Include(_) => choose_pose(view, |state| state == RowState::LeftOut, Intent::Include),
             Intent::ReadPoints(proposal) => {
-                text("File with the points (text, CSV or xlsx)", proposal, Intent::ReadPoints)
+                path("File with the points (text, CSV or xlsx)", proposal, Intent::ReadPoints)
             }
             Intent::ShowPoints(_) => text("Points, one per line", "", Intent::ShowPoints),
             Intent::SuggestPoses(count) => {
@@ -134,6 +138,21 @@ impl Dialog {
             | Self::Choice { .. }
             | Self::Menu { .. }
             | Self::Form(_) => None,
+        }
+    }
+
+    /// This dialog with what was typed into another one that asked the same. Coordinates are not taken over: the next ones are
+    /// typed there.
+    #[must_use]
+    pub fn with_answers_of(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Text { field, intent }, Self::Text { field: other, .. })
+                if field.label() == other.label() && !field.is_checked() =>
+            {
+                Self::Text { field: other.proposed(), intent }
+            }
+            (Self::Form(form), Self::Form(other)) if form.title() == other.title() => Self::Form(other),
+            (dialog, _) => dialog,
         }
     }
 
@@ -223,6 +242,9 @@ impl Dialog {
                 items.push(KeyHint::new("Ctrl-U", "clear the line", 4));
             }
             Self::Text { .. } | Self::Note { .. } | Self::Number { .. } => {
+                if matches!(self, Self::Text { field, .. } if field.is_path()) {
+                    items.push(KeyHint::new("Tab", "complete", 2));
+                }
                 items.push(KeyHint::new("Ctrl-U", "clear the line", 4));
             }
         }
@@ -238,6 +260,12 @@ impl Dialog {
             Self::Form(form) => form.draw(theme, area, buf),
         }
     }
+}
+
+/// A path as far as the names of files say it.
+pub fn completed(begun: &str) -> Completion {
+    let (text, names) = store::completions(begun);
+    Completion { text, names }
 }
 
 /// What the links see now, as it is written into fields.

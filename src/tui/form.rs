@@ -6,7 +6,7 @@ mod text;
 
 pub use choice::ChoiceList;
 pub use number::NumberField;
-pub use text::{TextField, Validator};
+pub use text::{Completion, TextField, Validator};
 
 /// What a field did with a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

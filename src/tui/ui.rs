@@ -16,6 +16,7 @@ use crate::session::set_up::Step;
 use crate::session::state::Session;
 use crate::units::{DEGREE, MILLIMETRE};
 use crate::wizard::Intent;
+use crate::wizard::notice::Severity;
 use crate::wizard::view::{Content, JointShown, ViewModel};
 
 /// Rows of a screen below a dialog that are worth showing.
@@ -43,6 +44,8 @@ pub struct Ui {
     step: Step,
     screen: Box<dyn Screen>,
     dialog: Option<Dialog>,
+    /// The dialog that was submitted last. What was typed into it is proposed again if it is refused.
+    submitted: Option<Dialog>,
     /// Scroll position of the help page; `None` if it is closed.
     help: Option<usize>,
     camera: Camera,
@@ -82,6 +85,7 @@ impl Ui {
             step: Step::Profile,
             screen: screen::of(Step::Profile),
             dialog: None,
+            submitted: None,
             help: None,
             camera: Camera::default(),
             scene: None,
@@ -149,7 +153,7 @@ impl Ui {
                 }
                 let cx = ScreenCx { view, scene: self.scene.as_ref(), camera: &self.camera, theme: self.theme };
                 let outcome = self.screen.on_paste(&text, &cx);
-                self.on_outcome(outcome).unwrap_or(Command::None)
+                self.on_outcome(outcome, view).unwrap_or(Command::None)
             }
             Input::Scroll(lines) => {
                 let code = if lines < 0 { KeyCode::PageUp } else { KeyCode::PageDown };
@@ -170,7 +174,7 @@ impl Ui {
                     Command::None
                 }
                 DialogOutcome::Submitted(intent) => {
-                    self.dialog = None;
+                    self.submitted = self.dialog.take();
                     Command::Intent(intent)
                 }
             };
@@ -185,13 +189,14 @@ impl Ui {
         }
         let cx = ScreenCx { view, scene: self.scene.as_ref(), camera: &self.camera, theme: self.theme };
         let outcome = self.screen.on_key(key, &cx);
-        if let Some(command) = self.on_outcome(outcome) {
+        if let Some(command) = self.on_outcome(outcome, view) {
             return command;
         }
         match keymap::action(key, &view.intents) {
             Some(Action::Offer(info)) => {
                 // A blocked intent needs no dialog: the wizard answers with the reason.
-                self.dialog = Dialog::before(&info, view).filter(|_| info.is_enabled());
+                let dialog = Dialog::before(&info, view).filter(|_| info.is_enabled());
+                self.dialog = dialog.map(|dialog| self.again_if_refused(dialog, view));
                 if self.dialog.is_some() { Command::None } else { Command::Intent(info.intent) }
             }
             Some(Action::Local(LocalAction::Help)) => {
@@ -214,15 +219,24 @@ impl Ui {
     }
 
     /// The command that follows from a screen's outcome; `None` if it did not handle the input.
-    fn on_outcome(&mut self, outcome: ScreenOutcome) -> Option<Command> {
+    fn on_outcome(&mut self, outcome: ScreenOutcome, view: &ViewModel) -> Option<Command> {
         match outcome {
             ScreenOutcome::Ignored => None,
             ScreenOutcome::Changed => Some(Command::None),
             ScreenOutcome::Intent(intent) => Some(Command::Intent(intent)),
             ScreenOutcome::Open(dialog) => {
-                self.dialog = Some(*dialog);
+                self.dialog = Some(self.again_if_refused(*dialog, view));
                 Some(Command::None)
             }
+        }
+    }
+
+    /// The dialog as it was submitted, if the wizard refused that; else the new one.
+    fn again_if_refused(&mut self, dialog: Dialog, view: &ViewModel) -> Dialog {
+        let is_refused = view.notice.as_ref().is_some_and(|notice| notice.severity >= Severity::Error);
+        match self.submitted.take() {
+            Some(before) if is_refused => dialog.with_answers_of(before),
+            _ => dialog,
         }
     }
 

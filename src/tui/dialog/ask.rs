@@ -217,8 +217,10 @@ pub fn recorded() -> Dialog {
                 "",
                 "Path of a CSV file with joint values and measured points, units in its header.",
             )
+            .path()
             .text("rows to use", "", rows)
             .text("table to verify with", "", "Path; it may be the same file with other rows. Empty: no verification.")
+            .path()
             .text("rows to use", "", rows)
             .pick(
                 "layout",

@@ -13,7 +13,8 @@ pub(super) fn program() -> Dialog {
     let pose = "For what the program does not state: x,y,z,rx,ry,rz (mm; degrees about the fixed axes), or NAME=x,y,z,rx,ry,rz; several with ';'.";
     Dialog::Form(
         Form::new("Robot program to correct with the result", chosen)
-            .text("program", "", "Its path, typed or pasted. The program itself is not changed.")
+            .text("program", "", "Its path, typed or pasted; Tab completes it. The program itself is not changed.")
+            .path()
             .pick("language", LANGUAGES, 0, "Left/Right.")
             .pick(
                 "points",

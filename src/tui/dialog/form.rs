@@ -4,6 +4,7 @@ use crossterm::event::KeyCode;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
+use super::completed;
 use super::plain::{replace, with_value};
 use crate::text::{alternatives, wrapped};
 use crate::tui::form::{FieldOutcome, TextField};
@@ -116,6 +117,20 @@ impl Form {
         let value = Value::Text(TextField::new(label.clone(), value));
         self.fields.push(Field { label, about, value, take: None, is_typed: false });
         self
+    }
+
+    /// Makes the last field a path, which a tabulator completes.
+    #[must_use]
+    pub fn path(mut self) -> Self {
+        if let Some(Field { value: Value::Text(field), .. }) = self.fields.last_mut() {
+            *field = field.clone().path(completed);
+        }
+        self
+    }
+
+    /// The question that the form asks.
+    pub fn title(&self) -> &str {
+        &self.title
     }
 
     /// Lets Enter take over what a link sees into the last field, and move on to the next one.
@@ -234,6 +249,8 @@ impl Form {
                 return if self.value().is_ok() { FieldOutcome::Submitted } else { FieldOutcome::Changed };
             }
             KeyCode::Esc => return FieldOutcome::Cancelled,
+            // A path is completed first; with nothing to add the focus moves on.
+            KeyCode::Tab if self.completes() => {}
             KeyCode::Tab | KeyCode::Down => self.focus = (self.focus + 1) % count,
             KeyCode::BackTab | KeyCode::Up => self.focus = (self.focus + count - 1) % count,
             _ => {
@@ -250,6 +267,16 @@ impl Form {
             }
         }
         FieldOutcome::Changed
+    }
+
+    /// Completes the path in the focused field; whether it is one with something to add.
+    fn completes(&mut self) -> bool {
+        let Some(Field { value: Value::Text(field), is_typed, .. }) = self.fields.get_mut(self.focus) else {
+            return false;
+        };
+        let has_news = !field.text().trim().is_empty() && field.complete();
+        *is_typed |= has_news;
+        has_news
     }
 
     /// Whether Enter moves on to the next field: a link sees what this one takes.
@@ -309,8 +336,13 @@ impl Form {
         }
         row += 1;
         let columns = usize::from(area.width);
-        let about = self.fields.get(self.focus).map_or("", |field| field.about);
-        for line in wrapped(&theme.glyphs.show(about), columns) {
+        let focused = self.fields.get(self.focus);
+        let choices = focused.and_then(|field| match &field.value {
+            Value::Text(text) => text.choices(),
+            Value::Pick { .. } => None,
+        });
+        let about = choices.unwrap_or_else(|| focused.map_or("", |field| field.about).to_owned());
+        for line in wrapped(&theme.glyphs.show(&about), columns) {
             paint::text(buf, area, (0, row), &line, theme.style(Role::Hint));
             row += 1;
         }

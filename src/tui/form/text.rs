@@ -26,15 +26,63 @@ pub struct TextField {
     /// Whether the text is a proposal. Typing replaces a proposal, unless the cursor was moved into it first.
     is_proposal: bool,
     check: Option<Validator>,
+    /// Of a path: how a tabulator completes it.
+    complete: Option<fn(&str) -> Completion>,
+    /// Names that the text can be completed to, where there are several.
+    names: Vec<String>,
+}
+
+/// A path as far as it is certain, and the names among which it is not.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Completion {
+    pub text: String,
+    pub names: Vec<String>,
 }
 
 impl TextField {
     /// A field with an initial text and the cursor behind it.
     pub fn new(label: impl Into<String>, text: &str) -> Self {
-        let mut field =
-            Self { label: label.into(), characters: Vec::new(), cursor: 0, is_proposal: false, check: None };
+        let mut field = Self {
+            label: label.into(),
+            characters: Vec::new(),
+            cursor: 0,
+            is_proposal: false,
+            check: None,
+            complete: None,
+            names: Vec::new(),
+        };
         field.paste(text);
         field
+    }
+
+    /// Makes the text a path, which a tabulator completes.
+    #[must_use]
+    pub const fn path(mut self, complete: fn(&str) -> Completion) -> Self {
+        self.complete = Some(complete);
+        self
+    }
+
+    /// Whether a tabulator completes the text.
+    pub const fn is_path(&self) -> bool {
+        self.complete.is_some()
+    }
+
+    /// Completes a path; whether there was something to add or to choose from.
+    pub fn complete(&mut self) -> bool {
+        let Some(complete) = self.complete else { return false };
+        let text = self.text();
+        let found = complete(&text);
+        let has_news = found.text != text || (found.names.len() > 1 && found.names != self.names);
+        self.is_proposal = false;
+        self.characters = found.text.chars().take(LONGEST).collect();
+        self.cursor = self.characters.len();
+        self.names = found.names;
+        has_news
+    }
+
+    /// The names that the text can be completed to, in one line.
+    pub fn choices(&self) -> Option<String> {
+        (self.names.len() > 1).then(|| self.names.join("  "))
     }
 
     /// Makes the initial text a proposal, which typing replaces like a selection.
@@ -130,8 +178,10 @@ impl TextField {
             (KeyCode::Delete, _) if self.cursor < self.characters.len() => {
                 self.characters.remove(self.cursor);
             }
+            (KeyCode::Tab, _) if self.complete() => return FieldOutcome::Changed,
             _ => return FieldOutcome::Ignored,
         }
+        self.names.clear();
         FieldOutcome::Changed
     }
 
@@ -153,6 +203,12 @@ impl TextField {
             let lines = wrapped(&theme.glyphs.show(&problem), usize::from(area.width));
             for (row, line) in (2..area.height).zip(&lines) {
                 paint::text(buf, area, (0, row), line, theme.style(Role::Warn));
+            }
+        }
+        if let Some(choices) = self.choices() {
+            let lines = wrapped(&theme.glyphs.show(&choices), usize::from(area.width));
+            for (row, line) in (2..area.height).zip(&lines) {
+                paint::text(buf, area, (0, row), line, theme.style(Role::Hint));
             }
         }
         if let Some(understood) = self.understood().filter(|_| !self.characters.is_empty()) {
@@ -238,6 +294,23 @@ mod tests {
         assert_eq!(field.understood().as_deref(), Some("X"));
         assert_eq!(field.on_key(Key::plain_code(KeyCode::Enter)), FieldOutcome::Submitted);
         assert_eq!(field.on_key(Key::plain_code(KeyCode::Esc)), FieldOutcome::Cancelled);
+    }
+
+    #[test]
+    fn a_tabulator_completes_a_path_and_then_lists_what_is_possible() {
+        let folder = |begun: &str| match begun {
+            "pl" => Completion { text: "plan".to_owned(), names: vec!["plan.csv".to_owned(), "plan2.csv".to_owned()] },
+            other => Completion { text: other.to_owned(), names: vec!["plan.csv".to_owned(), "plan2.csv".to_owned()] },
+        };
+        let mut field = TextField::new("file", "pl").path(folder);
+        let tab = Key::plain_code(KeyCode::Tab);
+        assert_eq!((field.on_key(tab), field.text().as_str()), (FieldOutcome::Changed, "plan"));
+        assert_eq!(field.choices().as_deref(), Some("plan.csv  plan2.csv"));
+        // Nothing new: a form goes to its next field.
+        assert_eq!(field.on_key(tab), FieldOutcome::Ignored);
+        typed(&mut field, &[KeyCode::Char('2')]);
+        assert_eq!((field.text().as_str(), field.choices()), ("plan2", None));
+        assert_eq!(TextField::new("note", "pl").on_key(tab), FieldOutcome::Ignored);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 
 use super::page::{Page, picture, split};
 use super::{PicturePlace, Screen, ScreenCx, ScreenOutcome};
-use crate::tui::dialog::Dialog;
+use crate::tui::dialog::{Dialog, completed};
 use crate::tui::form::TextField;
 use crate::tui::glyphs::shortened;
 use crate::tui::keymap::{Key, KeyHint};
@@ -121,7 +121,7 @@ impl ProfileScreen {
 
 /// Asks for the path of a profile.
 fn file() -> ScreenOutcome {
-    let field = TextField::new("Path of the profile (RON)", "");
+    let field = TextField::new("Path of the profile (RON)", "").path(completed);
     ScreenOutcome::Open(Box::new(Dialog::Text { field, intent: Intent::ChooseProfile }))
 }
 

@@ -70,6 +70,30 @@ impl Ui {
 }
 
 #[test]
+fn a_path_that_was_refused_is_proposed_again_until_one_is_accepted() {
+    let type_in = |ui: &mut Ui, view: &ViewModel, keys: &[Key]| -> Command {
+        keys.iter().fold(Command::None, |_, key| ui.on_input(Input::Key(*key), view))
+    };
+    let key = |c: char| Key::plain_code(KeyCode::Char(c));
+    let enter = Key::plain_code(KeyCode::Enter);
+    let view = view();
+    let mut ui = Ui::new(themes()[0]);
+    ui.refresh(&view, &Session::default());
+    let asked = Command::Intent(Intent::ChooseProfile("x.ro".to_owned()));
+    let typed = [key('f'), key('x'), key('.'), key('r'), key('o'), enter];
+    assert_eq!(type_in(&mut ui, &view, &typed), asked);
+    let mut refused = view.clone();
+    refused.notice = Some(Notice::error("there is no profile 'x.ro'"));
+    ui.refresh(&refused, &Session::default());
+    let end = Key::plain_code(KeyCode::End);
+    let corrected = Command::Intent(Intent::ChooseProfile("x.ron".to_owned()));
+    assert_eq!(type_in(&mut ui, &refused, &[key('f'), end, key('n'), enter]), corrected);
+    // Accepted, the next question begins empty.
+    ui.refresh(&view, &Session::default());
+    assert_eq!(type_in(&mut ui, &view, &[key('f'), enter]), Command::Intent(Intent::ChooseProfile(String::new())));
+}
+
+#[test]
 fn the_bell_rings_once_for_what_needs_attention() {
     let usual = screen::capture_tests::usual();
     let asked = screen::capture_tests::in_question();
