@@ -8,19 +8,25 @@ use std::time::Duration;
 use super::{Console, load, payload_of, refused};
 use crate::cli::SimulateArgs;
 use crate::error::{ExitStatus, Failure};
+use crate::kinematics::JointType;
 use crate::link::{LinkError, Served};
 use crate::procedure::joint_types;
 use crate::profile::Profile;
 use crate::runtime::signals;
+use crate::session::journal::from_edge;
 use crate::session::plan::{self, PlannedPose, PoseKind};
 use crate::session::simulation::Simulation;
 use crate::session::wire::WireProtocol;
 use crate::store;
+use crate::text::counted;
 
 /// Interval at which the robot checks whether to move on.
 const LOOK: Duration = Duration::from_millis(50);
 /// The robot moves on after this many checks without a shot: a driver reads the joints once more after its last shot.
 const PAUSE: u32 = 20;
+
+/// What can be typed.
+const ORDERS: &str = "next, goto POSE, joints VALUES (deg, mm), where or quit";
 
 /// An event that the simulation reacts to.
 enum Order {
@@ -64,6 +70,7 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     }
     let loaded = load::profile(&args.profile)?;
     let profile = &loaded.profile;
+    let joint_types = joint_types(profile);
     let mut route = Route { poses: poses(args, profile)?, at: 0 };
     let payload = payload_of(&args.payload, profile)?;
     let simulation = Simulation { seed: args.seed, joint_errors: args.joint_errors, payload, ..Simulation::default() };
@@ -84,7 +91,7 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     }
     console.remark(served.title());
     console.remark(&format!("the robot is at {}", route.text()));
-    console.remark("'next', 'goto POSE', 'where', 'quit' or Ctrl-C");
+    console.remark(&format!("{ORDERS}, or Ctrl-C"));
     let (sender, orders) = channel();
     let signalled = sender.clone();
     // The receiver is gone once this function has returned.
@@ -94,7 +101,7 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
     loop {
         match orders.recv_timeout(LOOK) {
             Ok(Order::End) | Err(RecvTimeoutError::Disconnected) => break,
-            Ok(Order::Line(line)) => match obey(line.trim(), &mut route, &mut served) {
+            Ok(Order::Line(line)) => match obey(line.trim(), &joint_types, &mut route, &mut served) {
                 Some(said) => console.remark(&said),
                 None => break,
             },
@@ -103,7 +110,7 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
                 quiet = if taken == seen && taken >= args.shots { quiet + 1 } else { 0 };
                 seen = taken;
                 let is_done = args.shots > 0 && quiet >= PAUSE && route.at + 1 < route.poses.len();
-                if is_done && let Some(said) = obey("next", &mut route, &mut served) {
+                if is_done && let Some(said) = obey("next", &joint_types, &mut route, &mut served) {
                     quiet = 0;
                     console.remark(&said);
                 }
@@ -114,7 +121,7 @@ pub(super) fn run<O: Write, E: Write>(args: &SimulateArgs, console: &mut Console
 }
 
 /// The answer to a typed line; `None` ends the program.
-fn obey(line: &str, route: &mut Route, served: &mut Served) -> Option<String> {
+fn obey(line: &str, joint_types: &[JointType], route: &mut Route, served: &mut Served) -> Option<String> {
     let target = match line.split_once(char::is_whitespace) {
         _ if line == "quit" => return None,
         _ if line.is_empty() || line == "where" => {
@@ -126,7 +133,20 @@ fn obey(line: &str, route: &mut Route, served: &mut Served) -> Option<String> {
             Some(found) => found,
             None => return Some(format!("there is no pose '{}'", pose.trim())),
         },
-        _ => return Some(format!("'{line}' is not a command; use next, goto POSE, where or quit")),
+        Some(("joints", values)) => match configuration(values, joint_types) {
+            Ok(configuration) => {
+                let pose = "typed".to_owned();
+                route.poses.push(PlannedPose {
+                    pose,
+                    kind: PoseKind::Identification,
+                    configuration,
+                    point_in_base: None,
+                });
+                route.poses.len() - 1
+            }
+            Err(problem) => return Some(problem),
+        },
+        _ => return Some(format!("'{line}' is not a command; use {ORDERS}")),
     };
     let before = std::mem::replace(&mut route.at, target);
     match route.go(served) {
@@ -136,6 +156,21 @@ fn obey(line: &str, route: &mut Route, served: &mut Served) -> Option<String> {
             Some(error.to_string())
         }
     }
+}
+
+/// The configuration of pendant values (rad, m) from typed ones (deg, mm).
+fn configuration(values: &str, joint_types: &[JointType]) -> Result<Vec<f64>, String> {
+    let typed: Result<Vec<f64>, String> = values
+        .split_whitespace()
+        .map(|value| {
+            value.parse().ok().filter(|value: &f64| value.is_finite()).ok_or(format!("'{value}' is not a number"))
+        })
+        .collect();
+    let typed = typed?;
+    if typed.len() != joint_types.len() {
+        return Err(format!("the robot has {}, not {}", counted(joint_types.len(), "joint"), typed.len()));
+    }
+    Ok(from_edge(&typed, joint_types))
 }
 
 /// Sends the lines of standard input. Its end is not an event: a simulator may run without a terminal.
