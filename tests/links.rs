@@ -18,6 +18,7 @@ use trupose::report::{Document, PointOrigin};
 use trupose::session::calibration::Calibration;
 use trupose::session::journal::Entry;
 use trupose::session::state::Session;
+use trupose::session::summary::ParameterSummary;
 use trupose::store::session::read_journal;
 
 /// A folder with a plan of 18 poses.
@@ -124,6 +125,48 @@ fn a_rehearsal_over_every_wire_ends_with_the_calibration_of_one_in_process() {
             }
             assert_eq!(found.code, in_process.code, "{wires}");
             assert!(found.transcript.contains("simulated cell, seed 1, over "), "{wires}: {}", found.transcript);
+        }
+    });
+}
+
+/// Differences of the parameters in their stated standard deviations: root mean square, and the largest.
+fn differences_in_sigma(one: &Calibration, other: &Calibration) -> (f64, f64) {
+    let pairs = one.parameters.iter().zip(&other.parameters);
+    let ratio = |(one, other): (&ParameterSummary, &ParameterSummary)| {
+        Some((one.deviation - other.deviation).abs() / one.sigma.filter(|sigma| *sigma > 0.0)?)
+    };
+    let ratios: Vec<f64> = pairs.filter_map(ratio).collect();
+    let squares: f64 = ratios.iter().map(|ratio| ratio * ratio).sum();
+    ((squares / ratios.len() as f64).sqrt(), ratios.into_iter().fold(0.0, f64::max))
+}
+
+/// Each instrument and each robot at least once; all pairs where `TRUPOSE_ALL_WIRES` is set.
+#[test]
+fn an_instrument_beside_a_robot_ends_with_the_calibration_of_one_in_process_within_its_sigma() {
+    let robots = ["Rtde", "Joints", "Kuka", "Abb", "Fanuc", "Yaskawa"];
+    let instruments = ["Emscon", "Ascii", "Geocom", "Ndi"];
+    let has_all = std::env::var_os("TRUPOSE_ALL_WIRES").is_some();
+    let pairs = robots.iter().enumerate().flat_map(|(number, robot)| {
+        let usual = number % instruments.len();
+        let chosen = if has_all { &instruments[..] } else { &instruments[usual..=usual] };
+        chosen.iter().map(move |instrument| (*instrument, *robot))
+    });
+    thread::scope(|scope| {
+        let in_process = scope.spawn(|| rehearsed(""));
+        let over = pairs.map(|(instrument, robot)| {
+            (instrument, robot, scope.spawn(move || rehearsed(&format!("Tcp({instrument}), Tcp({robot})"))))
+        });
+        // All are started before the first is waited for: they wait for simulated seconds, not for the processor.
+        let over: Vec<_> = over.collect();
+        let in_process = in_process.join().unwrap();
+        for (instrument, robot, run) in over {
+            let found = run.join().unwrap();
+            let (rms, largest) = differences_in_sigma(&found.calibration, &in_process.calibration);
+            println!("{instrument} with {robot}: {rms:.3} sigma rms, at most {largest:.3}");
+            assert_eq!(found.calibration.rank, in_process.calibration.rank, "{instrument} with {robot}");
+            // The pulses of a Yaskawa controller are about as coarse as the tracker: they are noise of their own.
+            let limit = if robot == "Yaskawa" { 1.0 } else { 0.2 };
+            assert!(largest < limit, "{instrument} with {robot}: {rms} rms, at most {largest}");
         }
     });
 }

@@ -12,6 +12,8 @@ mod support;
 mod table_import;
 
 mod architecture;
+#[cfg(target_os = "linux")]
+mod by_keys;
 mod cartesian;
 mod cartesian_programs;
 mod cli;
@@ -55,8 +57,6 @@ mod report;
 mod scripts;
 #[cfg(unix)]
 mod sessions;
-#[cfg(target_os = "linux")]
-mod technician;
 #[cfg(target_os = "linux")]
 mod terminal;
 mod tested;

@@ -22,6 +22,11 @@ impl Technician {
         Self { terminal, keys: 0 }
     }
 
+    /// The wizard once more, in the same folder.
+    pub(crate) fn begins_again(&mut self, place: &Place) {
+        self.terminal = Self::start(place).terminal;
+    }
+
     pub(crate) fn press(&mut self, keys: &str) {
         self.keys += keys.chars().count();
         self.terminal.send(keys);
