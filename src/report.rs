@@ -16,7 +16,7 @@ mod text;
 pub use crate::text::fixed as number;
 pub use comparison::comparison_text;
 pub use document::{
-    Counts, Details, Document, DriftPart, FilePart, FindingPart, Found, ParameterNote, PointOrigin, PointPart,
+    AirPart, Counts, Details, Document, DriftPart, FilePart, FindingPart, Found, ParameterNote, PointOrigin, PointPart,
     PredictionPart, ResultState, RobotPart, SessionPart, TemperaturePart,
 };
 pub use health::{forecast_text, health_text};

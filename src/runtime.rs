@@ -18,6 +18,7 @@ pub mod recent;
 pub mod signals;
 mod store_thread;
 
+pub use crate::store::completions;
 pub use clock::Clock;
 pub use engine::{CompletedIntent, Engine, Options, Output};
 pub use events::Events;

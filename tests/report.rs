@@ -698,6 +698,25 @@ fn what_the_flange_carried_is_stated() {
 }
 
 #[test]
+fn the_air_is_stated_with_what_it_does_to_distances() {
+    let mut session = calibrated();
+    assert!(!text(&report(&session).1).contains("\nAir: "));
+    for (index, sample) in session.samples.iter_mut().enumerate() {
+        let later = if index == 0 { 0.0 } else { 1.0 };
+        sample.noted.temperature_degc = Some(20.0 + 2.0 * later);
+        sample.noted.pressure_hpa = Some(1010.0 - 5.0 * later);
+        sample.noted.humidity_percent = Some(40.0);
+    }
+    // Two degrees and five hectopascal: both make the air thinner, 1.86 and 1.35 ppm.
+    let (json, html) = report(&session);
+    let stated = "1005.0 to 1010.0 hPa, 40 to 40 % relative humidity; with the temperature it would change distances by 3.2 ppm, \
+                  if the instrument did not correct for it";
+    assert!(text(&html).contains(&format!("\nAir: {stated}\n")), "{}", text(&html));
+    let change = json["report"]["air"]["change_ppm"].as_f64().unwrap();
+    assert!((change - 3.21).abs() < 1e-9, "{change}");
+}
+
+#[test]
 fn numbers_that_are_none_reach_neither_file() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
         let mut session = with_result(|result| {

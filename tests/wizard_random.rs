@@ -379,6 +379,8 @@ impl Cell {
             scatter: odd.or_else(|| some(8.0 * MICROMETRE, self)),
             shots: request.shots,
             temperature: Some(20.0),
+            pressure: None,
+            humidity: None,
             configuration: if self.chance(10) { Some(vec![0.1; self.pick(8)]) } else { None },
             joint_scatter: None,
             remarks: Vec::new(),

@@ -167,6 +167,8 @@ fn measured(row: usize, kind: PoseKind, named: &NamedSample, types: &[JointType]
         scatter_mm: None,
         shots: 1,
         temperature_degc: named.temperature,
+        pressure_hpa: None,
+        humidity_percent: None,
         seconds: 0.0,
         predicted_error_sigma: None,
         remarks: Vec::new(),

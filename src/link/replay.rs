@@ -134,6 +134,8 @@ impl Link for Replay {
             scatter: None,
             shots: 1,
             temperature: row.temperature,
+            pressure: None,
+            humidity: None,
             configuration: Some(row.configuration.clone()),
             joint_scatter: None,
             remarks: Vec::new(),

@@ -300,6 +300,8 @@ impl Link for SimulatedCell {
             scatter: (count > 1).then(|| square.sqrt()),
             shots: count,
             temperature: None,
+            pressure: None,
+            humidity: None,
             configuration: None,
             joint_scatter: None,
             remarks: Vec::new(),

@@ -650,6 +650,8 @@ fn mean(shots: &[Shot], joints: Option<&JointMean>, seconds: f64) -> Reading {
         scatter: (shots.len() > 1).then(|| square.sqrt()),
         shots: u32::try_from(shots.len()).unwrap_or(u32::MAX),
         temperature: shots.iter().find_map(|shot| shot.temperature),
+        pressure: shots.iter().find_map(|shot| shot.pressure),
+        humidity: shots.iter().find_map(|shot| shot.humidity),
         configuration: joints.map(|joints| joints.mean.clone()),
         joint_scatter: joints.and_then(|joints| Some(JointScatter { sigma: joints.scatter()?, count: joints.count })),
         remarks: remarks(shots),

@@ -87,6 +87,9 @@ pub struct Details {
     pub certificate_expired: Option<Day>,
     /// Temperature over the samples that count.
     pub temperature: Option<TemperaturePart>,
+    /// The air, where the instrument measures it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub air: Option<AirPart>,
     /// Numbers of samples by kind.
     pub counts: Counts,
     /// Meaning of each parameter, in the order of `parameters`.
@@ -191,6 +194,15 @@ pub struct TemperaturePart {
     pub highest_degc: f64,
     /// Number of samples with a temperature.
     pub samples: usize,
+}
+
+/// The air during the measurements: the lowest and the highest value.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AirPart {
+    pub pressure_hpa: Option<(f64, f64)>,
+    pub humidity_percent: Option<(f64, f64)>,
+    /// Largest change of a distance since the first sample, if the instrument did not correct for the air (ppm).
+    pub change_ppm: f64,
 }
 
 /// A part of the arm: all points within a distance of a line, in the base.

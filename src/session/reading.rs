@@ -32,6 +32,10 @@ pub struct Reading {
     pub shots: u32,
     /// Temperature (°C).
     pub temperature: Option<f64>,
+    /// Pressure of the air (hPa).
+    pub pressure: Option<f64>,
+    /// Relative humidity of the air (%).
+    pub humidity: Option<f64>,
     /// Pendant joint values that the robot itself reported (rad, sliding joints m).
     pub configuration: Option<Vec<f64>>,
     /// Scatter of these values, if the robot reported them several times.

@@ -19,9 +19,9 @@ use super::form::{ChoiceList, Completion, FieldOutcome, NumberField, TextField};
 use super::keymap::{Key, KeyHint};
 use super::paint;
 use super::theme::{Role, Theme};
+use crate::runtime;
 use crate::session::set_up::{CoordinateUnit, InstrumentChoice};
 use crate::session::simulation::{Simulation, Truth};
-use crate::store;
 use crate::text::wrapped;
 use crate::wizard::view::{Content, RowState, RowView, ViewModel};
 use crate::wizard::{Danger, Intent, IntentInfo};
@@ -264,7 +264,7 @@ impl Dialog {
 
 /// A path as far as the names of files say it.
 pub fn completed(begun: &str) -> Completion {
-    let (text, names) = store::completions(begun);
+    let (text, names) = runtime::completions(begun);
     Completion { text, names }
 }
 

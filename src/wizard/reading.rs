@@ -203,6 +203,8 @@ pub(super) const fn typed(point: Point3<f64>) -> Reading {
         scatter: None,
         shots: 1,
         temperature: None,
+        pressure: None,
+        humidity: None,
         configuration: None,
         joint_scatter: None,
         remarks: Vec::new(),

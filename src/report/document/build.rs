@@ -6,14 +6,14 @@ use nalgebra::Point3;
 
 use super::decisions::{corrections, findings, not_counted};
 use super::{
-    BodyPart, Counts, DecisionPart, Details, Document, DriftPart, FilePart, Found, ParameterNote, PointOrigin,
+    AirPart, BodyPart, Counts, DecisionPart, Details, Document, DriftPart, FilePart, Found, ParameterNote, PointOrigin,
     PointPart, PredictionPart, RemarkPart, ResultState, RobotPart, SCHEMA, SessionPart, TemperaturePart,
 };
 use crate::kinematics::ForwardKinematics;
 use crate::profile::Capsule;
 use crate::report::text::found;
 use crate::session::about::Day;
-use crate::session::journal::{instrument_text, target_text};
+use crate::session::journal::{MeasuredText, instrument_text, target_text};
 use crate::session::plan::PoseKind;
 use crate::session::set_up::{InstrumentChoice, PayloadText, TargetChoice};
 use crate::session::sha256;
@@ -60,6 +60,7 @@ impl Document {
             target: target(session),
             payload: payload(session),
             temperature: temperature(session),
+            air: air(session),
             counts: counts(session),
             parameter_notes: parameters.iter().map(|parameter| note(parameter, session)).collect(),
             points: points(session),
@@ -163,6 +164,30 @@ fn temperature(session: &Session) -> Option<TemperaturePart> {
     let lowest_degc = measured.iter().copied().reduce(f64::min)?;
     let highest_degc = measured.iter().copied().reduce(f64::max)?;
     Some(TemperaturePart { lowest_degc, highest_degc, samples: measured.len() })
+}
+
+/// Change of a distance that light measures in air, per K, hPa and % of relative humidity (ppm): the derivatives of Edlén's equation
+/// at 20 °C, 1013 hPa and 50 %, 633 nm.
+const PPM_PER_DEGREE: f64 = 0.93;
+const PPM_PER_HECTOPASCAL: f64 = -0.27;
+const PPM_PER_PERCENT: f64 = 0.0085;
+
+fn air(session: &Session) -> Option<AirPart> {
+    let range = |of: fn(&MeasuredText) -> Option<f64>| {
+        let values: Vec<f64> =
+            session.counted().filter_map(|sample| of(&sample.noted)).filter(|value| value.is_finite()).collect();
+        Some((values.iter().copied().reduce(f64::min)?, values.iter().copied().reduce(f64::max)?))
+    };
+    let (pressure_hpa, humidity_percent) = (range(|noted| noted.pressure_hpa), range(|noted| noted.humidity_percent));
+    pressure_hpa.or(humidity_percent)?;
+    let effect = |noted: &MeasuredText| {
+        PPM_PER_DEGREE * noted.temperature_degc.unwrap_or(0.0)
+            + PPM_PER_HECTOPASCAL * noted.pressure_hpa.unwrap_or(0.0)
+            + PPM_PER_PERCENT * noted.humidity_percent.unwrap_or(0.0)
+    };
+    let first = session.counted().next().map_or(0.0, |sample| effect(&sample.noted));
+    let change_ppm = session.counted().map(|sample| (effect(&sample.noted) - first).abs()).fold(0.0, f64::max);
+    Some(AirPart { pressure_hpa, humidity_percent, change_ppm })
 }
 
 fn counts(session: &Session) -> Counts {

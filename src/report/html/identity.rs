@@ -1,7 +1,7 @@
 //! The subject of the report: robot, instrument, people, time, conditions; and the origin of its numbers.
 
 use super::markup::{NONE, add, escape, facts, number, paragraph, time};
-use crate::report::document::{Counts, Details, Document, PointOrigin, ResultState, TemperaturePart};
+use crate::report::document::{AirPart, Counts, Details, Document, PointOrigin, ResultState, TemperaturePart};
 use crate::session::about::Detail;
 use crate::text::counted;
 
@@ -78,6 +78,7 @@ pub(super) fn section(document: &Document) -> String {
         ("Reflector (SMR)", smr),
         row(Detail::Weather, "Weather"),
         ("Temperature", temperature(report.temperature)),
+        ("Air", report.air.map_or_else(String::new, air)),
         ("Measured", measured(report)),
     ];
     let expired = report.certificate_expired.map_or_else(String::new, |due| {
@@ -128,6 +129,19 @@ fn temperature(range: Option<TemperaturePart>) -> String {
             let span = number(range.highest_degc - range.lowest_degc, 1);
             format!("{low} to {high} °C over {} (range {span} °C)", counted(range.samples, "sample"))
         },
+    )
+}
+
+fn air(air: AirPart) -> String {
+    let range = |range: Option<(f64, f64)>, unit: &str, digits: usize| {
+        range.map(|(low, high)| format!("{} to {} {unit}", number(low, digits), number(high, digits)))
+    };
+    let values = [range(air.pressure_hpa, "hPa", 1), range(air.humidity_percent, "% relative humidity", 0)];
+    let values: Vec<String> = values.into_iter().flatten().collect();
+    let change = number(air.change_ppm, 1);
+    format!(
+        "{}; with the temperature it would change distances by {change} ppm, if the instrument did not correct for it",
+        values.join(", ")
     )
 }
 

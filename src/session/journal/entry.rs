@@ -317,6 +317,11 @@ pub struct MeasuredText {
     pub shots: u32,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_degc: Option<f64>,
+    /// Pressure and relative humidity of the air. Not in journals of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pressure_hpa: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub humidity_percent: Option<f64>,
     /// Time that the measurement took, motion included (s).
     pub seconds: f64,
     /// Predicted RMS position error at fresh poses, per σ, from this sample and all before it, once they determine the arm.

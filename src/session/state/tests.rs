@@ -58,6 +58,8 @@ fn sample(number: u64, row: usize) -> Entry {
         scatter_mm: None,
         shots: 1,
         temperature_degc: None,
+        pressure_hpa: None,
+        humidity_percent: None,
         seconds: 10.0,
         predicted_error_sigma: None,
         remarks: Vec::new(),

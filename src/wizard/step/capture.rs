@@ -186,6 +186,8 @@ impl CaptureStep {
                 .map(|scatter| (to_mm(scatter) * 1e6).round() / 1e6),
             shots: reading.shots,
             temperature_degc: reading.temperature,
+            pressure_hpa: reading.pressure.filter(|value| value.is_finite()),
+            humidity_percent: reading.humidity.filter(|value| value.is_finite()),
             seconds: reading.seconds,
             predicted_error_sigma: None,
             remarks: reading.remarks.iter().map(|remark| remark.text.clone()).collect(),

@@ -116,6 +116,8 @@ pub(super) fn reading(request: &MeasureRequest) -> Reading {
         scatter: Some(8.0 * MICROMETRE),
         shots: request.shots,
         temperature: Some(21.5),
+        pressure: Some(1012.5),
+        humidity: Some(44.0),
         configuration: None,
         joint_scatter: None,
         remarks: Vec::new(),
