@@ -323,7 +323,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let inside = |name: &str| format!("{}/{name}", folder.path().display());
         for name in ["plan.csv", "plan-2.csv", ".hidden", "other.csv"] {
-            fs::write(inside(name), "").unwrap();
+            replace(Path::new(&inside(name)), "").unwrap();
         }
         fs::create_dir(inside("programs")).unwrap();
         let (text, names) = completions(&inside("pl"));

@@ -8,7 +8,7 @@ use crate::wizard::Event;
 #[derive(Debug)]
 pub(super) enum Message {
     /// An event for the wizard.
-    Event(Event),
+    Event(Box<Event>),
     /// Tells the driver to look at its other inputs.
     Wake,
 }
@@ -20,7 +20,7 @@ pub struct Events(pub(super) SyncSender<Message>);
 impl Events {
     /// Sends an event, and waits while the channel is full. Returns `false` if the engine is gone.
     pub fn send(&self, event: Event) -> bool {
-        self.0.send(Message::Event(event)).is_ok()
+        self.0.send(Message::Event(Box::new(event))).is_ok()
     }
 
     /// Ends the driver's wait without an event, because it has another input such as a key. Returns `false` if the engine is
@@ -31,7 +31,7 @@ impl Events {
 
     /// Sends an event unless the channel is full.
     pub(super) fn offer(&self, event: Event) {
-        match self.0.try_send(Message::Event(event)) {
+        match self.0.try_send(Message::Event(Box::new(event))) {
             // The next report supersedes this one.
             Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
         }
