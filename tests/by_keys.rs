@@ -198,7 +198,6 @@ fn a_technician_measures_an_arm_by_circles_and_continues_with_it() {
 }
 
 /// From the choice of the SMR to a corrected program. On the way two poses are exchanged, one is missed, and the connection drops.
-#[expect(clippy::too_many_lines, reason = "one day of a technician")]
 fn calibrates(place: &Place, technician: &mut Technician, mut cell: Cell) {
     technician.does("p", "the choice", |shown| shown.has("chosen       as the profile says"));
     technician.does("n", "step 4", |shown| shown.step() == Some(4));
@@ -301,7 +300,6 @@ fn calibrates(place: &Place, technician: &mut Technician, mut cell: Cell) {
     let corrected = fs::read_to_string(folder.join("corrected/pick.src")).unwrap();
     assert!(corrected.starts_with("DEF pick()\nPTP {A1 ") && !corrected.contains("A1 10,"), "{corrected}");
 
-    eprintln!("{} keys for {} samples, findings: {findings:?}", technician.keys, state.counted().count());
     technician.press("q");
     technician.press("y");
     assert_eq!(technician.terminal.end(PATIENCE, 0.0).0, 0);

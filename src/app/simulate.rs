@@ -163,7 +163,11 @@ fn configuration(values: &str, joint_types: &[JointType]) -> Result<Vec<f64>, St
     let typed: Result<Vec<f64>, String> = values
         .split_whitespace()
         .map(|value| {
-            value.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| format!("'{value}' is not a number"))
+            value
+                .parse()
+                .ok()
+                .filter(|value: &f64| value.is_finite())
+                .ok_or_else(|| format!("'{value}' is not a number"))
         })
         .collect();
     let typed = typed?;

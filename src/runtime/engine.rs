@@ -227,7 +227,7 @@ impl Engine {
     pub fn wait(&mut self, timeout: Duration) -> bool {
         match self.events.recv_timeout(timeout) {
             Ok(Message::Event(event)) => {
-                self.handle(event);
+                self.handle(*event);
                 true
             }
             Ok(Message::Wake) => true,

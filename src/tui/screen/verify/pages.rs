@@ -65,9 +65,8 @@ fn sentence(verification: &VerificationSummary, verdict: &Verdict) -> String {
 const fn role_of(verdict: &Verdict) -> Role {
     match verdict.status {
         VerdictStatus::Accepted if verdict.undecided.is_empty() => Role::Ok,
-        VerdictStatus::Accepted => Role::Warn,
+        VerdictStatus::Accepted | VerdictStatus::NotEvaluated => Role::Warn,
         VerdictStatus::NotAccepted => Role::Alarm,
-        VerdictStatus::NotEvaluated => Role::Warn,
     }
 }
 
