@@ -93,6 +93,34 @@ fn is_given_back(terminal: &Terminal) {
 }
 
 #[test]
+fn any_key_takes_over_a_demonstration_and_does_nothing_else() {
+    /// Longer than a page of the demonstration stays.
+    const LONGER_THAN_A_PAGE: Duration = Duration::from_secs(5);
+    const ESCAPE: &str = "\u{1b}";
+    const DOWN: &str = "\u{1b}[B";
+    let place = Place::new();
+    let taken_over = |key: &str| {
+        let mut terminal = Terminal::start(place.0.path(), &["demo", "--watch"], SIZE);
+        terminal.wait_for_text("you are watching; any key takes over");
+        terminal.send(key);
+        terminal.wait_for_text("you have taken over");
+        let text = terminal.text();
+        assert!(text.contains("\u{25b8} abb_irb120") && !text.contains("Leave the program?"), "{key:?}:\n{text}");
+        terminal
+    };
+    for key in ["q", "c", "7", ESCAPE, DOWN] {
+        drop(taken_over(key));
+    }
+    let mut terminal = taken_over(ENTER);
+    let is_driven = |shown: &Shown| shown.has("The session gets a name") || shown.step() != Some(1);
+    assert!(!terminal.comes(LONGER_THAN_A_PAGE, is_driven), "it is still driven:\n{}", terminal.text());
+    terminal.send(ENTER);
+    terminal.wait_for_text("use this robot");
+    terminal.send(ENTER);
+    terminal.wait_for_step(2);
+}
+
+#[test]
 fn the_whole_calibration_is_walked_by_keys() {
     let place = Place::new();
     // The program sees the modes as the shell has set them: so they must be when it has ended.
