@@ -599,6 +599,7 @@ fn a_corrected_profile_differs_from_the_nominal_one_in_geometry_and_targets_only
         let (read, _) = Profile::parse(&text, "corrected.ron").unwrap();
         assert_eq!(read.fixed_parameters(), profile.fixed_parameters());
         assert_eq!(read.beta_joints(), profile.beta_joints());
+        assert_eq!(read.joint_aliases(), profile.joint_aliases());
         let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
         for (a, b) in read.joints().iter().zip(profile.joints()) {
             for (a, b) in [(a.limits, b.limits), (a.planning_limits, b.planning_limits)] {

@@ -37,7 +37,7 @@ pub struct Arm<'a> {
 /// list it.
 pub fn geometry_only(heading: &Heading<'_>, arm: &Arm<'_>) -> String {
     let mut lines = Vec::new();
-    head(&mut lines, heading, arm);
+    head(&mut lines, heading, arm, &[]);
     for line in [
         "    // Not known from the geometry, to be filled in where the defaults do not fit:",
         "    // targets: the SMR on the flange; free within 50 mm of the flange origin as long as it is left out",
@@ -61,7 +61,7 @@ pub fn geometry_only(heading: &Heading<'_>, arm: &Arm<'_>) -> String {
 pub fn complete(heading: &Heading<'_>, profile: &Profile, chain: &KinematicChain, targets: &[Target]) -> String {
     let mut lines = Vec::new();
     let arm = Arm { chain, ranges: profile.joints(), beta_joints: profile.beta_joints(), masses: profile.masses() };
-    head(&mut lines, heading, &arm);
+    head(&mut lines, heading, &arm, profile.joint_aliases());
     lines.extend(gravity_lines(profile));
     lines.push("    targets: [".to_owned());
     for target in targets {
@@ -149,7 +149,7 @@ fn rest(lines: &mut Vec<String>, profile: &Profile) {
     }
 }
 
-fn head(lines: &mut Vec<String>, heading: &Heading<'_>, arm: &Arm<'_>) {
+fn head(lines: &mut Vec<String>, heading: &Heading<'_>, arm: &Arm<'_>, aliases: &[Vec<String>]) {
     lines.extend(heading.comments.iter().map(|line| format!("// {}", printable(line))));
     let convention = match arm.chain.convention() {
         Convention::Standard => "Standard",
@@ -169,7 +169,8 @@ fn head(lines: &mut Vec<String>, heading: &Heading<'_>, arm: &Arm<'_>) {
             Masses::Links(links) => links.get(index),
             Masses::Weight(_) | Masses::Unknown => None,
         };
-        lines.extend(joint_lines(joint, &range, mass, arm.beta_joints.contains(&index), arm.chain));
+        let aliases = aliases.get(index).map_or(&[][..], Vec::as_slice);
+        lines.extend(joint_lines(joint, &range, mass, arm.beta_joints.contains(&index), arm.chain, aliases));
     }
     lines.push("    ],".to_owned());
     lines.extend(pose("flange", arm.chain.flange()));
@@ -203,6 +204,7 @@ fn joint_lines(
     mass: Option<&LinkMass>,
     has_beta: bool,
     chain: &KinematicChain,
+    aliases: &[String],
 ) -> Vec<String> {
     let link = joint.link;
     let (joint_type, unit) = match joint.joint_type {
@@ -246,6 +248,10 @@ fn joint_lines(
     interval("planning_limits", range.planning_limits.filter(|planning| Some(*planning) != usual));
     second.extend(range.max_speed.map(|speed| format!("max_speed_{unit}_s: {}", edge(quantity, speed))));
     second.extend(range.pulses_per_degree.map(|pulses| format!("pulses_per_degree: {}", number(pulses))));
+    if !aliases.is_empty() {
+        let names: Vec<String> = aliases.iter().map(|name| quoted(name)).collect();
+        second.push(format!("aliases: [{}]", names.join(", ")));
+    }
     let more = [second.join(", "), mass.map(mass_fields).unwrap_or_default()];
     let more = more.into_iter().filter(|fields| !fields.is_empty()).map(|fields| format!("            {fields}"));
     let fields: Vec<String> = std::iter::once(first).chain(more).collect();
