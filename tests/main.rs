@@ -19,6 +19,7 @@ mod cartesian_programs;
 mod cli;
 mod compensate;
 mod contacts;
+mod descriptions;
 mod docs;
 mod example;
 #[cfg(unix)]
