@@ -257,6 +257,41 @@ fn a_robot_is_tested_with_its_instrument_and_alone() {
 }
 
 #[test]
+fn a_controller_that_reports_pulses_is_tested_with_the_profile_that_states_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut profile = include_str!("../profiles/soochow.ron").to_owned();
+    for (joint, pulses) in trupose::link::simulator::yaskawa::PULSES_PER_DEGREE.iter().enumerate() {
+        let name = format!(r#"(name: "J{}", type: Revolute,"#, joint + 1);
+        assert!(profile.contains(&name));
+        profile = profile.replace(&name, &format!("{name} pulses_per_degree: {pulses:?},"));
+    }
+    let file = folder.path().join("arm.ron");
+    fs::write(&file, profile).unwrap();
+    let file = file.to_str().unwrap();
+    let simulator = Simulator::start(&["emscon", "--listen", "127.0.0.1:0", "--robot", "yaskawa:127.0.0.1:0"]);
+    let alone = |more: &[&str]| {
+        let robot = simulator.robot.as_deref().unwrap();
+        let output = trupose(&[&["link", "test", robot, "--seconds", "1.5"], more].concat());
+        (output.status.code(), text(&output.stdout), text(&output.stderr))
+    };
+    let (code, output, errors) = alone(&["--profile", file]);
+    assert_eq!((code, errors.as_str()), (Some(0), ""), "{output}");
+    assert!(output.contains("robot at rest at 0.000 15.000 -5.000"), "{output}");
+    let (code, output, errors) = simulator.tested(&["--shots", "1", "--seconds", "1", "--profile", file]);
+    assert_eq!((code, errors.as_str()), (Some(0), ""), "{output}");
+    assert!(output.contains("robot at rest at 0.000 15.000 -5.000"), "{output}");
+    // Given options count before the profile. A profile without pulses does not help.
+    let (code, output, errors) = alone(&["--profile", file, "--options", "(pulses_per_degree: [100.0])"]);
+    assert_eq!((code, errors.as_str()), (Some(0), ""), "{output}");
+    assert!(!output.contains("15.000"), "{output}");
+    for (more, said) in [(&["--profile", "soochow"][..], "reports pulses"), (&[], "reports pulses")] {
+        let (code, _, errors) = alone(more);
+        assert_eq!(code, Some(2), "{errors}");
+        assert!(errors.contains(said), "{errors}");
+    }
+}
+
+#[test]
 fn the_test_of_a_link_says_what_is_wrong_and_what_to_do() {
     for (protocol, fault, said, hint) in [
         ("emscon", "metres@1x*", "the instrument has a wrong setting: units", "reconnect"),

@@ -7,11 +7,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use super::{Console, refused};
+use super::{Console, load, refused};
 use crate::cli::{LinkCommand, LinkTestArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::link::protocol::CONTROLLER;
 use crate::link::{Link as _, LinkError, LinkEvent, RawLog, Wired, WiredRobot};
+use crate::profile::Profile;
 use crate::runtime::signals;
 use crate::session::reading::{LiveReading, MeasureRequest, Reading};
 use crate::session::wire::{LinkChoice, WireAddress};
@@ -49,8 +50,10 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
     let usage = |message: String| Failure::new(ExitStatus::Usage, message);
     let log = raw_log(args.raw_log.as_deref())?;
     let address: WireAddress = args.address.parse().map_err(usage)?;
+    let loaded = args.profile.as_deref().map(load::profile).transpose()?;
+    let profile = loaded.as_ref().map(|loaded| &loaded.profile);
     if address.protocol.is_robot() {
-        return test_robot(args, &address, log.as_ref(), console, &keep_going);
+        return test_robot(args, &address, profile, log.as_ref(), console, &keep_going);
     }
     let choice = LinkChoice {
         address: args.address.clone(),
@@ -59,7 +62,11 @@ fn test<O: Write, E: Write>(args: &LinkTestArgs, console: &mut Console<O, E>) ->
         robot_options: args.robot_options.clone(),
         is_automatic: false,
     };
-    let mut wired = Wired::new(&choice, log.as_ref()).map_err(|error| usage(error.to_string()))?;
+    let wired = match profile {
+        Some(profile) => Wired::for_arm(profile, &choice, log.as_ref()),
+        None => Wired::new(&choice, log.as_ref()),
+    };
+    let mut wired = wired.map_err(|error| usage(error.to_string()))?;
     console.say(&format!("connecting to {address}\n"))?;
     let mut on_event = |event: LinkEvent| console.remark(&event_text(&event));
     let connected = wired.connect_while(&keep_going, &mut on_event);
@@ -114,12 +121,17 @@ fn ended_early() -> Failure {
 fn test_robot<O: Write, E: Write>(
     args: &LinkTestArgs,
     address: &WireAddress,
+    profile: Option<&Profile>,
     log: Option<&RawLog>,
     console: &mut Console<O, E>,
     keep_going: &dyn Fn() -> bool,
 ) -> Result<ExitStatus, Failure> {
-    let mut robot = WiredRobot::new(address, args.options.as_deref(), log)
-        .map_err(|error| Failure::new(ExitStatus::Usage, error.to_string()))?;
+    let options = args.options.as_deref();
+    let robot = match profile {
+        Some(profile) => WiredRobot::for_arm(profile, address, options, log),
+        None => WiredRobot::new(address, options, log),
+    };
+    let mut robot = robot.map_err(|error| Failure::new(ExitStatus::Usage, error.to_string()))?;
     console.say(&format!("connecting to {address}\n"))?;
     let mut on_event = |event: LinkEvent| console.remark(&event_text(&event));
     let identity = robot.connect_while(keep_going, &mut on_event).map_err(|error| problem(&error, "cannot connect"))?;

@@ -30,6 +30,9 @@ pub struct LinkTestArgs {
     /// Options of the controller's protocol, such as '(pulses_per_degree: [1000.0, ...])' of a Yaskawa
     #[arg(long, value_name = "TEXT", requires = "robot")]
     pub robot_options: Option<String>,
+    /// Robot profile, a file or the name of a shipped one: checks that the controller can report its joints, and provides the pulses per degree of a Yaskawa
+    #[arg(long, value_name = "NAME|FILE")]
+    pub profile: Option<String>,
     /// Number of shots; 0 for none
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=1000))]
     pub shots: u32,

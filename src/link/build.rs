@@ -29,6 +29,7 @@ use super::simulator::kuka::KukaSimulator;
 use super::simulator::ndi::NdiSimulator;
 use super::simulator::rtde::RtdeSimulator;
 use super::simulator::yaskawa::{PULSES_PER_DEGREE, YaskawaSimulator};
+use crate::profile::Profile;
 use crate::session::wire::{Route, WireAddress, WireProtocol};
 
 /// Allowed duration of a stationary measurement (ms).
@@ -144,8 +145,17 @@ pub(super) fn protocol(address: &WireAddress, options: Option<&str>) -> Result<B
 }
 
 /// The options of a Yaskawa controller as text.
-pub(super) fn yaskawa_options(pulses_per_degree: &[f64]) -> String {
+fn yaskawa_options(pulses_per_degree: &[f64]) -> String {
     format!("(pulses_per_degree: {pulses_per_degree:?})")
+}
+
+/// The options of an arm's controller: those given, or else what the profile knows.
+pub(super) fn robot_options(profile: &Profile, protocol: WireProtocol, given: Option<&str>) -> Option<String> {
+    if given.is_some() || protocol != WireProtocol::Yaskawa {
+        return given.map(str::to_owned);
+    }
+    let pulses: Option<Vec<f64>> = profile.joints().iter().map(|joint| joint.pulses_per_degree).collect();
+    pulses.map(|pulses| yaskawa_options(&pulses))
 }
 
 /// Refuses options of a protocol that has none.

@@ -3,10 +3,12 @@
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
+use super::cell_view::check_joints;
 use super::protocol::{CONTROLLER, Failure, Identity};
 use super::wire::{RawLog, Wire, WireEvent};
 use super::wired::{joints_timeout, link_ended};
 use super::{LinkError, LinkEvent, build};
+use crate::profile::Profile;
 use crate::session::reading::LiveReading;
 use crate::session::wire::WireAddress;
 
@@ -40,6 +42,20 @@ impl WiredRobot {
         let wire = Wire::start(address.clone(), protocol, log.cloned())
             .map_err(|error| LinkError::SetUp(format!("cannot start the link: {error}")))?;
         Ok(Self { wire, identity: None, down: None, stopped: None })
+    }
+
+    /// The controller of an arm: what the profile knows about it is added to the options.
+    ///
+    /// # Errors
+    /// As [`Self::new`], and an arm that the controller cannot report.
+    pub fn for_arm(
+        profile: &Profile,
+        address: &WireAddress,
+        options: Option<&str>,
+        log: Option<&RawLog>,
+    ) -> Result<Self, LinkError> {
+        check_joints(profile, address.protocol)?;
+        Self::new(address, build::robot_options(profile, address.protocol, options).as_deref(), log)
     }
 
     /// Waits until the controller reports joint values. Messages of the set-up go to `on_event`.

@@ -13,7 +13,7 @@ use super::wire::{Latest, RawLog, Wire, WireEvent, WireMonitor};
 use super::{Link, LinkError, LinkEvent, build};
 use crate::profile::Profile;
 use crate::session::reading::{JointScatter, LiveReading, MeasureRequest, Reading, Remark};
-use crate::session::wire::{LinkChoice, WireAddress, WireProtocol};
+use crate::session::wire::{LinkChoice, WireAddress};
 use crate::units::to_mm;
 
 /// Longest duration of a set-up: trackers take more than a minute to initialise.
@@ -126,17 +126,10 @@ impl Wired {
     /// As [`Self::new`], and an arm that the controller cannot report.
     pub fn for_arm(profile: &Profile, choice: &LinkChoice, log: Option<&RawLog>) -> Result<Self, LinkError> {
         Self::check_arm(profile, choice)?;
-        let is_yaskawa = choice.robot.as_deref().is_some_and(|robot| {
-            WireAddress::of_robot(robot).is_ok_and(|address| address.protocol == WireProtocol::Yaskawa)
-        });
-        let pulses: Option<Vec<f64>> = profile.joints().iter().map(|joint| joint.pulses_per_degree).collect();
-        match pulses.filter(|_| is_yaskawa && choice.robot_options.is_none()) {
-            Some(pulses) => {
-                let robot_options = Some(build::yaskawa_options(&pulses));
-                Self::new(&LinkChoice { robot_options, ..choice.clone() }, log)
-            }
-            None => Self::new(choice, log),
-        }
+        let robot = choice.robot.as_deref().map(WireAddress::of_robot).transpose().map_err(LinkError::SetUp)?;
+        let robot_options =
+            robot.and_then(|robot| build::robot_options(profile, robot.protocol, choice.robot_options.as_deref()));
+        Self::new(&LinkChoice { robot_options, ..choice.clone() }, log)
     }
 
     /// Checks that the robot's controller of a choice, if any, can report the joints of this arm.
