@@ -20,7 +20,7 @@ pub use document::{
     PredictionPart, ResultState, RobotPart, SessionPart, TemperaturePart,
 };
 pub use health::{forecast_text, health_text};
-pub use html::{comparison_html, report_html};
+pub use html::{comparison_html, report_html, test_html};
 pub use iso9283::test_text;
 pub use plan::plan_text;
 pub use text::{identification_text, verification_text};

@@ -12,6 +12,7 @@ use trupose::iso9283::{Label, MeasuringPlane, POSES};
 use trupose::kinematics::{Arm, ForwardKinematics, LinkParameter, ParameterId, Place};
 use trupose::procedure::iso9283::{TestError, TestPlanRequest, plan};
 use trupose::profile::{Profile, builtin};
+use trupose::program::Dialect;
 use trupose::session::plan::PoseKind;
 use trupose::units::{DEGREE, MILLIMETRE, to_mm};
 
@@ -135,6 +136,18 @@ fn figures_are_those_of_the_arm() {
         text.contains("P2-P4") && text.contains("the load is not stated") && !text.contains("in accordance"),
         "{text}"
     );
+
+    let page = folder.path().join("test.html");
+    let replaced = ["iso9283", "report", "--profile", "abb_irb120", "--measurements", table.to_str().unwrap()];
+    let output = trupose(&[&replaced[..], &["--load", "<3 kg>", "--out", page.to_str().unwrap()]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let html = fs::read_to_string(page).unwrap();
+    // The page has the figures of the text, needs nothing else, and claims no more.
+    let figure = text.lines().find(|line| line.starts_with("P2-P4")).unwrap();
+    let figure = figure.split_whitespace().nth(1).unwrap().replace('-', "−");
+    assert!(html.contains("P2 to P4") && html.contains(&figure), "{figure} {html}");
+    assert!(html.contains("&lt;3 kg&gt;") && html.contains("the speed is not stated") && html.contains("dAP of P1"));
+    assert!(!html.contains("in accordance") && !html.contains("//") && !html.contains("<script"), "{html}");
 }
 
 #[test]
@@ -160,7 +173,7 @@ fn rows_of_other_poses_and_too_few_cycles_are_named() {
 }
 
 #[test]
-fn a_plan_becomes_a_robot_program() {
+fn a_plan_becomes_a_program_of_every_robot() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("iso.csv");
     let out = path.to_str().unwrap();
@@ -169,7 +182,9 @@ fn a_plan_becomes_a_robot_program() {
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(String::from_utf8_lossy(&output.stdout).contains("42 poses to measure"));
     let programs = folder.path().to_str().unwrap();
-    let arguments = ["program", "--profile", "ur5", "--plan", out, "--dialect", "urscript", "--out", programs];
-    let output = trupose(&arguments);
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    for dialect in Dialect::NAMES {
+        let arguments = ["program", "--profile", "ur5", "--plan", out, "--dialect", dialect, "--out", programs];
+        let output = trupose(&arguments);
+        assert_eq!(output.status.code(), Some(0), "{dialect}: {}", String::from_utf8_lossy(&output.stderr));
+    }
 }

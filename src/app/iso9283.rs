@@ -5,13 +5,15 @@ use std::io::Write;
 use nalgebra::{Isometry3, Point3};
 
 use super::{Console, load, to_json};
-use crate::cli::iso9283::{EvaluateArgs, Iso9283Command, TestPlanArgs};
+use crate::checksum::{self, Syntax};
+use crate::cli::iso9283::{Iso9283Command, TestArgs, TestPlanArgs};
 use crate::error::{ExitStatus, Failure};
 use crate::kinematics::Arm;
 use crate::procedure::iso9283::{Reading, TestError, TestPlanRequest, TestRequest, evaluate, plan};
 use crate::procedure::{input_file, joint_types, provenance};
 use crate::report;
 use crate::session::calibration::Calibration;
+use crate::session::iso9283::TestSummary;
 use crate::session::plan;
 use crate::session::summary::InputRole;
 use crate::store;
@@ -24,7 +26,18 @@ pub(super) fn run<O: Write, E: Write>(
 ) -> Result<ExitStatus, Failure> {
     match command {
         Iso9283Command::Plan(args) => write_plan(args, console),
-        Iso9283Command::Evaluate(args) => figures(args, console),
+        Iso9283Command::Evaluate(args) => {
+            let summary = figures(&args.test, console)?;
+            console.print(&if args.json { to_json(&summary)? } else { report::test_text(&summary) })?;
+            Ok(ExitStatus::Accepted)
+        }
+        Iso9283Command::Report(args) => {
+            let page = report::test_html(&figures(&args.test, console)?);
+            store::replace(&args.out, &checksum::with_sum(&page, Syntax::Html))
+                .map_err(|error| Failure::from_error(ExitStatus::Store, &error))?;
+            console.print(&format!("written: {}\n", args.out.display()))?;
+            Ok(ExitStatus::Accepted)
+        }
     }
 }
 
@@ -73,34 +86,34 @@ struct Arms {
     base_from_station: Option<(Isometry3<f64>, Isometry3<f64>)>,
 }
 
-fn figures<O: Write, E: Write>(args: &EvaluateArgs, console: &mut Console<O, E>) -> Result<ExitStatus, Failure> {
+/// The figures of a measured test.
+fn figures<O: Write, E: Write>(args: &TestArgs, console: &mut Console<O, E>) -> Result<TestSummary, Failure> {
     let mut inputs = Vec::new();
-    let (loaded, arms) = match (&args.calibration, &args.profile) {
+    let (profile, profile_text, arms) = match (&args.calibration, &args.profile) {
         (Some(path), _) => {
             let file = path.display().to_string();
-            let text = load::text(path)?;
+            let loaded = load::calibration(path, args.edited, console)?;
+            let calibration = loaded.calibration;
+            let profile = calibration.mounted_on(&loaded.profile);
             let unusable = |error: &dyn std::error::Error| {
                 Failure::new(ExitStatus::Usage, format!("'{file}' is not a usable calibration: {}", causes(error)))
             };
-            let calibration = Calibration::parse(&text).map_err(|error| unusable(&error))?;
-            let mut loaded = load::parse_profile(calibration.profile.clone(), &format!("{file} (profile)"))?;
-            loaded.profile = calibration.mounted_on(&loaded.profile);
             let arms = Arms {
-                nominal: calibration.nominal(&loaded.profile).map_err(|error| unusable(&error))?,
-                identified: Some(calibration.identified(&loaded.profile).map_err(|error| unusable(&error))?),
+                nominal: calibration.nominal(&profile).map_err(|error| unusable(&error))?,
+                identified: Some(calibration.identified(&profile).map_err(|error| unusable(&error))?),
                 base_from_station: if args.same_set_up { Some(stations(&calibration, &file)?) } else { None },
             };
-            inputs.push(input_file(InputRole::Calibration, file, text.as_bytes()));
-            (loaded, arms)
+            inputs.push(input_file(InputRole::Calibration, file, loaded.text.as_bytes()));
+            (profile, calibration.profile, arms)
         }
         (None, Some(name)) => {
             let loaded = load::profile(name)?;
             let nominal = loaded.profile.arm();
-            (loaded, Arms { nominal, identified: None, base_from_station: None })
+            (loaded.profile, loaded.text, Arms { nominal, identified: None, base_from_station: None })
         }
         (None, None) => return Err(Failure::new(ExitStatus::Usage, "give '--profile' or '--calibration'")),
     };
-    let named = (&loaded.profile, args.profile.as_deref().unwrap_or_default());
+    let named = (&profile, args.profile.as_deref().unwrap_or_default());
     let measured = load::measurements(&args.measurements, "named", named, InputRole::Verification)?;
     for warning in &measured.table.warnings {
         console.remark(&format!("note: {warning}"));
@@ -112,7 +125,7 @@ fn figures<O: Write, E: Write>(args: &EvaluateArgs, console: &mut Console<O, E>)
     let rows: Vec<_> = measured.table.distinct_rows().collect();
     let readings = rows
         .iter()
-        .zip(load::samples(&rows, &loaded.profile)?)
+        .zip(load::samples(&rows, &profile)?)
         .map(|(row, sample)| {
             let label = row.pose.parse().map_err(|source| TestError::Label { line: row.line, source })?;
             Ok(Reading { label, sample })
@@ -127,11 +140,9 @@ fn figures<O: Write, E: Write>(args: &EvaluateArgs, console: &mut Console<O, E>)
         readings: &readings,
         load: args.load.clone(),
         speed: args.speed.clone(),
-        provenance: provenance(&loaded.profile, &loaded.text, load::now(), inputs),
+        provenance: provenance(&profile, &profile_text, load::now(), inputs),
     };
-    let summary = evaluate(&request).map_err(|error| failure(&error))?;
-    console.print(&if args.json { to_json(&summary)? } else { report::test_text(&summary) })?;
-    Ok(ExitStatus::Accepted)
+    evaluate(&request).map_err(|error| failure(&error))
 }
 
 /// The place of the instrument for the nominal and the identified arm.

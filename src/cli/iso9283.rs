@@ -14,6 +14,8 @@ pub enum Iso9283Command {
     Plan(TestPlanArgs),
     /// Accuracy and repeatability from the points that were attained
     Evaluate(EvaluateArgs),
+    /// The same figures as a page
+    Report(ReportArgs),
 }
 
 /// Arguments of `iso9283 plan`.
@@ -42,9 +44,9 @@ pub struct TestPlanArgs {
     pub out: PathBuf,
 }
 
-/// Arguments of `iso9283 evaluate`.
+/// A measured test.
 #[derive(Args, Debug)]
-pub struct EvaluateArgs {
+pub struct TestArgs {
     /// Measured points; the column 'pose' has the names of the plan, such as 'c07-P3'
     #[arg(long, value_name = "CSV")]
     pub measurements: PathBuf,
@@ -63,9 +65,29 @@ pub struct EvaluateArgs {
     /// The speed of the test, in words, such as '100 % of the rated speed'
     #[arg(long, value_name = "TEXT")]
     pub speed: Option<String>,
+    /// Use the calibration although it has changed since this program wrote it, because the change was made on purpose
+    #[arg(long, requires = "calibration")]
+    pub edited: bool,
+}
+
+/// Arguments of `iso9283 evaluate`.
+#[derive(Args, Debug)]
+pub struct EvaluateArgs {
+    #[command(flatten)]
+    pub test: TestArgs,
     /// Print one JSON object instead of tables
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `iso9283 report`.
+#[derive(Args, Debug)]
+pub struct ReportArgs {
+    #[command(flatten)]
+    pub test: TestArgs,
+    /// File for the page
+    #[arg(long, value_name = "HTML")]
+    pub out: PathBuf,
 }
 
 fn point(text: &str) -> Result<[f64; 3], String> {

@@ -8,6 +8,7 @@ mod annex;
 mod charts;
 mod comparison;
 mod identity;
+mod iso9283;
 mod joints;
 mod markup;
 mod measuring;
@@ -21,6 +22,7 @@ mod views;
 use crate::report::document::{Details, Document, PointOrigin};
 use crate::text::shortened;
 pub use comparison::comparison_html;
+pub use iso9283::test_html;
 use markup::{add, css_string, escape};
 
 /// The rules of the page.

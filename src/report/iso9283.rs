@@ -20,17 +20,8 @@ pub fn test_text(summary: &TestSummary) -> String {
         let given = given.as_deref().map_or_else(|| "not stated".to_owned(), printable);
         text.push(format!("  {name}: {given}\n"));
     }
-    let frame = match summary.frame {
-        FrameSource::Fitted => "fitted to these same poses",
-        FrameSource::Calibration => "as at the identification",
-    };
-    text.push(format!("  place of the instrument: {frame}\n\n"));
-    let cycles: Vec<usize> = summary.poses.iter().map(|pose| pose.cycles).collect();
-    let cycles = match (cycles.iter().min(), cycles.iter().max()) {
-        (Some(fewest), Some(most)) if fewest < most => format!("{fewest} to {most} cycles"),
-        (Some(all), _) => counted(*all, "cycle"),
-        (None, _) => String::new(),
-    };
+    text.push(format!("  place of the instrument: {}\n\n", frame(summary)));
+    let cycles = cycles(summary);
     text.push(format!("Poses, {cycles} (mm; in brackets the 95 % interval)\n"));
     text.push(row(["", "accuracy AP", "AP, corrected", "repeatability RP"]));
     for pose in &summary.poses {
@@ -69,6 +60,24 @@ pub fn test_text(summary: &TestSummary) -> String {
         text.extend(lines.iter().map(|line| format!("  {line}\n")));
     }
     text.concat()
+}
+
+/// Where the frame of the instrument comes from.
+pub(super) const fn frame(summary: &TestSummary) -> &'static str {
+    match summary.frame {
+        FrameSource::Fitted => "fitted to these same poses",
+        FrameSource::Calibration => "as at the identification",
+    }
+}
+
+/// The number of cycles of the poses.
+pub(super) fn cycles(summary: &TestSummary) -> String {
+    let cycles = || summary.poses.iter().map(|pose| pose.cycles);
+    match (cycles().min(), cycles().max()) {
+        (Some(fewest), Some(most)) if fewest < most => format!("{fewest} to {most} cycles"),
+        (Some(all), _) => counted(all, "cycle"),
+        (None, _) => String::new(),
+    }
 }
 
 fn row([name, before, after, repeatability]: [&str; 4]) -> String {

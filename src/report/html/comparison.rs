@@ -1,7 +1,6 @@
 //! The comparison of calibrations as a page, in the style of the report.
 
-use super::STYLE;
-use super::markup::{Column, add, escape, number, paragraph, table};
+use super::markup::{Column, add, escape, number, page, paragraph, table};
 use super::plot::{Plot, Scale, WIDTH};
 use crate::report::comparison::{cause_text, letter};
 use crate::session::comparison::{ComparisonSummary, CurveDifference, PairSummary};
@@ -12,12 +11,7 @@ const HEIGHT: f64 = 150.0;
 
 /// The comparison as a page that needs nothing else.
 pub fn comparison_html(summary: &ComparisonSummary) -> String {
-    let mut html = String::from("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
-    html.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
-    let robot = escape(&summary.robot);
-    add(&mut html, &format!("<title>Comparison of calibrations: {robot}</title>\n"));
-    add(&mut html, &format!("<style>\n{STYLE}</style>\n</head>\n<body>\n"));
-    add(&mut html, &format!("<h1>Comparison of calibrations</h1>\n<p class=\"lead\">{robot}</p>\n"));
+    let mut html = String::new();
     for warning in &summary.warnings {
         add(&mut html, &format!("<p class=\"warn\">{}</p>\n", escape(&warning.message)));
     }
@@ -53,12 +47,8 @@ pub fn comparison_html(summary: &ComparisonSummary) -> String {
     for pair in &summary.pairs {
         html.push_str(&section(pair));
     }
-    add(
-        &mut html,
-        &format!("<p class=\"small soft\">{}, {}</p>\n", escape(&summary.program), escape(&summary.created)),
-    );
-    html.push_str("</body>\n</html>\n");
-    html
+    let origin = format!("{}, {}", summary.program, summary.created);
+    page("Comparison of calibrations", &summary.robot, &html, &origin)
 }
 
 fn names(pair: &PairSummary) -> String {

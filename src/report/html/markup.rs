@@ -1,5 +1,6 @@
 //! Text, numbers and tables as HTML. Text from outside passes through [`escape`]; nothing refers to other files or addresses.
 
+use super::STYLE;
 use crate::text::fixed;
 use crate::text::printable;
 
@@ -7,6 +8,17 @@ use crate::text::printable;
 pub(super) const NONE: &str = "–";
 /// A blank as wide as a digit.
 const FIGURE_SPACE: &str = "\u{2007}";
+
+/// A page that needs nothing else; `body` is HTML, the rest is text.
+pub(super) fn page(heading: &str, robot: &str, body: &str, origin: &str) -> String {
+    let [heading, robot, origin] = [heading, robot, origin].map(escape);
+    let mut html = String::from("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
+    html.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
+    add(&mut html, &format!("<title>{heading}: {robot}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n"));
+    add(&mut html, &format!("<h1>{heading}</h1>\n<p class=\"lead\">{robot}</p>\n{body}"));
+    add(&mut html, &format!("<p class=\"small soft\">{origin}</p>\n</body>\n</html>\n"));
+    html
+}
 
 /// Appends formatted text.
 pub(super) fn add(html: &mut String, part: &str) {
