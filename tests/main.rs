@@ -26,6 +26,7 @@ mod example;
 mod faults;
 mod gravity;
 mod health;
+mod health_cli;
 mod inverse;
 mod iso9283;
 mod joint_check;
