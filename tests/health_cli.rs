@@ -136,7 +136,9 @@ fn a_recalibration_says_what_the_old_data_weigh() {
     let weight = json["earlier"]["weight_percent"].as_f64().unwrap();
     assert!((1.0..100.0).contains(&weight) && json["earlier"]["moved"].as_array().unwrap().is_empty(), "{json}");
     let (_, out, _) = run(&arguments);
-    assert!(out.contains("earlier") && out.contains('%'), "{out}");
+    let words = out.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("Begun with the calibration of"), "{out}");
+    assert!(words.contains(&format!("(56 poses, which carry {weight:.0} % of the weight")), "{out}");
     let (code, _, said) = run(&["identify", "--profile", "soochow", "--measurements", few, "--from-calibration", few]);
     assert!(code == 2 && said.contains("not a usable calibration"), "{code} {said}");
 }
