@@ -116,12 +116,18 @@ fn bad_input_of_a_check_is_named() {
     fs::write(case.path("few.csv"), few).unwrap();
     let (code, _, said) = evaluate(&case.path("few.csv"), &[]);
     assert!(code == 2 && said.contains("pose"), "{code} {said}");
-    // A digit that changed in the calibration.
-    let changed = fs::read_to_string(case.path("calibration.ron")).unwrap().replacen("0.1", "0.2", 1);
+    // A digit of a deviation that changed, in a file that can still be read.
+    let intact = fs::read_to_string(case.path("calibration.ron")).unwrap();
+    let changed = intact.replacen("deviation: -3.8", "deviation: -3.7", 1);
+    assert_ne!(changed, intact);
     fs::write(case.path("changed.ron"), changed).unwrap();
     let (calibration, out) = (case.path("changed.ron"), case.path("never.csv"));
-    let (code, _, said) = run(&["check", "plan", "--calibration", &calibration, "--out", &out]);
-    assert!(code == 2 && !PathBuf::from(out).exists(), "{code} {said}");
+    let planned = run(&["check", "plan", "--calibration", &calibration, "--out", &out]);
+    let points = case.path("all.csv");
+    let test = ["iso9283", "report", "--calibration", &calibration, "--measurements", &points, "--out", &out];
+    for (code, _, said) in [planned, run(&test)] {
+        assert!(code == 2 && said.contains("give '--edited'") && !PathBuf::from(&out).exists(), "{code} {said}");
+    }
 }
 
 #[test]

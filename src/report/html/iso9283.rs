@@ -1,6 +1,6 @@
 //! The figures of a test after ISO 9283 as a page, in the style of the report.
 
-use super::markup::{Column, NONE, escape, facts, number, page, paragraph, table};
+use super::markup::{Column, NONE, add, escape, facts, number, page, paragraph, table};
 use crate::report::iso9283::{cycles, frame};
 use crate::session::iso9283::{AccuracyMm, DirectionRow, DistanceRow, EstimateMm, PoseRow, TestSummary};
 
@@ -25,8 +25,11 @@ pub fn test_html(summary: &TestSummary) -> String {
     html.push_str(&distances(summary));
     html.push_str(&variations(summary));
     html.push_str("<h2>What differs from the procedure of the standard</h2>\n");
-    let items: String = summary.deviations.iter().map(|item| format!("<li>{}</li>\n", escape(item))).collect();
-    html.push_str(&format!("<ul>\n{items}</ul>\n"));
+    html.push_str("<ul>\n");
+    for deviation in &summary.deviations {
+        add(&mut html, &format!("<li>{}</li>\n", escape(deviation)));
+    }
+    html.push_str("</ul>\n");
     html.push_str("<h2>Definitions</h2>\n");
     html.push_str(&facts(&DEFINITIONS.map(|(name, meaning)| (name, meaning.to_owned()))));
     let origin = format!("{}, {}", provenance.program, provenance.created);
