@@ -41,9 +41,10 @@ fn description(joints: &str) -> String {
         let words: Vec<&str> = line.split(' ').collect();
         let [kind, x, y, z, roll, pitch, yaw, u, v, w] = words[..] else { panic!("{line}") };
         let next = index + 1;
-        text += &format!(
+        let part = format!(
             "<link name='part{next}'><visual/></link>\n<joint type='{kind}' name='drive_{next}'><axis xyz='{u} {v} {w}'/>\n <limit upper='1.9' lower='-1.7' velocity='2'/><child link='part{next}'/><parent link='part{index}'/><origin rpy='{roll} {pitch} {yaw}' xyz='{x} {y} {z}'/></joint>\n"
         );
+        text.push_str(&part);
     }
     let last = joints.lines().count();
     text + &format!(
