@@ -99,7 +99,7 @@ impl Dialog {
             Intent::StatePayload(payload) => Some(ask::payload(payload)),
             Intent::About(about) => Some(ask::about(about)),
             Intent::CorrectProgram(_) => Some(correct::program()),
-            Intent::DescribeCell(cell) => Some(cell::cell(cell)),
+            Intent::DescribeCell(cell) => Some(cell::cell(cell, matches!(view.content, Content::Verify(_)))),
             Intent::DescribeRobot(sheet) => Some(cell::data_sheet(sheet)),
             Intent::PlaceTracker(points) => Some(place::tracker(points)).map(|dialog| dialog.seeing(view)),
             Intent::CheckFaces(_) => Some(place::faces().seeing(view)),

@@ -11,15 +11,16 @@ use crate::wizard::Intent;
 
 /// Instruments to pick: those of the list, and whatever the fields below say.
 const PICKS: &[&str] = &["as below", "Leica AT", "Vantage", "Radian", "total station 0.5\"", "total station 1\""];
+const ACCEPTED_RMS: &str = "accepted RMS (mm)";
 const MAKERS: &[&str] = &["abb", "fanuc", "kuka", "staubli"];
 
-/// Asks for everything about the cell, starting with what is known.
-pub(super) fn cell(known: &CellText) -> Dialog {
+/// Asks for everything about the cell, filled in with what is known. Where there is a result, it begins at the acceptance limits.
+pub(super) fn cell(known: &CellText, has_result: bool) -> Dialog {
     let text = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
     let instrument = known.instrument.as_ref();
     let tracker = known.tracker_mm.map_or_else(String::new, |(x, y, z)| format!("{x} {y} {z}"));
     let acceptance = known.acceptance.unwrap_or_default();
-    Dialog::Form(
+    let form =
         Form::new("This cell. Filled in from the last session or the profile", stated)
             .pick("instrument", PICKS, 0, "Left/Right. From the list: half of what the maker allows as the largest error of a point. as below: the two fields that follow, such as those of its certificate.")
             .text("name of it", instrument.map_or("", |one| &one.name), "Maker, type and serial number. Empty: nothing is known about its accuracy.")
@@ -28,9 +29,9 @@ pub(super) fn cell(known: &CellText) -> Dialog {
             .text("tracker at x y z (mm)", &tracker, "Where it stands, seen from the base of the robot; to about 0.1 m. For lines of sight when poses are chosen.")
             .text("joint limits (deg)", &limits_as_text(&known.planning_limits), "For poses in this cell, narrower than the robot's own: J1 -90..90, J4 -180..180 (sliding joints mm). Empty: those of the profile.")
             .text("boxes (mm)", &boxes_as_text(&known.keep_out), "What the arm must not touch, in the base: a name and two corners, separated by ';': table 300 -500 0 900 500 400; fence ...")
-            .text("accepted RMS (mm)", &text(acceptance.position_rms_mm), "Largest RMS position error on poses that were not used. The moment at which limits are set is kept in the journal.")
-            .text("accepted max (mm)", &text(acceptance.position_max_mm), "Largest position error of a single pose. Empty: not limited."),
-    )
+            .text(ACCEPTED_RMS, &text(acceptance.position_rms_mm), "Largest RMS position error on poses that were not used. The moment at which limits are set is kept in the journal.")
+            .text("accepted max (mm)", &text(acceptance.position_max_mm), "Largest position error of a single pose. Empty: not limited.");
+    Dialog::Form(if has_result { form.starting_at(ACCEPTED_RMS) } else { form })
 }
 
 fn stated(values: &[String]) -> Result<Intent, String> {
@@ -129,10 +130,15 @@ mod tests {
             planning_limits: limits_from_text("J1 -90..90, J4 -170..170").unwrap(),
             keep_out: boxes_from_text("table 300 -500 0 900 500 400").unwrap(),
         };
-        let Dialog::Form(form) = cell(&known) else { panic!() };
+        let Dialog::Form(form) = cell(&known, false) else { panic!() };
         assert_eq!(form.value(), Ok(Intent::DescribeCell(Box::new(known))));
-        let Dialog::Form(form) = cell(&CellText::default()) else { panic!() };
+        let Dialog::Form(mut form) = cell(&CellText::default(), true) else { panic!() };
         assert_eq!(form.value(), Ok(Intent::DescribeCell(Box::default())));
+        // With a result, the limits come first.
+        form.paste("0.3");
+        let limits = AcceptanceText { position_rms_mm: Some(0.3), position_max_mm: None };
+        let cell = CellText { acceptance: Some(limits), ..CellText::default() };
+        assert_eq!(form.value(), Ok(Intent::DescribeCell(Box::new(cell))));
     }
 
     #[test]

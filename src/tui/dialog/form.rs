@@ -31,6 +31,8 @@ pub struct Form {
     has_labels: bool,
     /// What the links see now.
     taken: Taken,
+    /// Whether it has a place of its own where Enter accepts it.
+    is_accepted_at_its_end: bool,
 }
 
 /// What a field can take over from a link.
@@ -107,6 +109,7 @@ impl Form {
             is_tried: false,
             has_labels: false,
             taken: Taken::default(),
+            is_accepted_at_its_end: false,
         }
     }
 
@@ -144,8 +147,16 @@ impl Form {
 
     /// Adds the place where Enter accepts the form.
     #[must_use]
-    pub fn done(self) -> Self {
+    pub fn done(mut self) -> Self {
+        self.is_accepted_at_its_end = true;
         self.pick("done", &["Enter accepts all"], 0, "Up/Down goes back to a line.")
+    }
+
+    /// Begins at the field with this label.
+    #[must_use]
+    pub fn starting_at(mut self, label: &str) -> Self {
+        self.focus = self.fields.iter().position(|field| field.label == label).unwrap_or(self.focus);
+        self
     }
 
     /// Puts the label and a tabulator before each value.
@@ -279,9 +290,11 @@ impl Form {
         has_news
     }
 
-    /// Whether Enter moves on to the next field: a link sees what this one takes.
+    /// Whether Enter moves on to the next field: a link sees what this one takes, or the form is accepted at its end and lacks
+    /// something.
     fn is_on_the_way(&self) -> bool {
-        self.offered(self.focus).is_some()
+        let is_last = self.focus + 1 >= self.fields.len();
+        self.offered(self.focus).is_some() || (self.is_accepted_at_its_end && !is_last && self.value().is_err())
     }
 
     /// Inserts pasted text into the focused field.

@@ -189,6 +189,16 @@ mod tests {
     }
 
     #[test]
+    fn enter_on_the_name_of_a_box_moves_on_to_its_corners() {
+        let mut dialog = obstacle("box1");
+        for typed in ["", "900 500 0", "300 -500 400"] {
+            dialog.paste(typed);
+            let is_last = typed.starts_with('3');
+            assert_eq!(enter(&mut dialog) == DialogOutcome::Open, !is_last, "{typed}");
+        }
+    }
+
+    #[test]
     fn without_links_enter_accepts_the_form() {
         let mut dialog = limits(&JointLimitsText(vec![("J1".to_owned(), Some((-10.0, 20.0)))]));
         let wanted = vec![("J1".to_owned(), Some((-10.0, 20.0)))];
