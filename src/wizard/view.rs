@@ -123,6 +123,9 @@ pub struct Header {
     pub robot: Option<String>,
     pub session: Option<String>,
     pub folder: Option<String>,
+    /// The folder with its whole path, for a copy from another computer.
+    #[serde(skip)]
+    pub folder_from_root: Option<String>,
     pub step: Step,
     /// Number of the step, from 1.
     pub number: usize,
@@ -590,6 +593,11 @@ pub struct DeliverView {
     pub corrected: Vec<CorrectedText>,
 }
 
+/// A folder with its whole path.
+fn from_root(folder: &str) -> Option<String> {
+    std::path::absolute(folder).ok().map(|folder| folder.display().to_string())
+}
+
 /// Builds the view of a wizard.
 pub(super) fn build(wizard: &Wizard) -> ViewModel {
     let session = &wizard.session;
@@ -600,6 +608,7 @@ pub(super) fn build(wizard: &Wizard) -> ViewModel {
             robot: session.robot.as_ref().map(|robot| robot.profile.title().to_owned()),
             session: wizard.folder.is_some().then(|| session.name.clone()),
             folder: wizard.folder.clone(),
+            folder_from_root: wizard.folder.as_deref().and_then(from_root),
             step,
             number: step.number(),
             steps: Step::ALL.len(),

@@ -99,7 +99,8 @@ fn page(cx: &ScreenCx<'_>, columns: u16, rows: u16) -> Page {
             page.paragraph("'trupose export --help' lists what can be done about it.", Role::Plain);
         }
         corrected(content, &path, &mut page);
-        next_steps(content, &path, folder, &mut page);
+        let from_root = cx.view.header.folder_from_root.as_deref().unwrap_or(folder);
+        next_steps(content, &path, (folder, from_root), &mut page);
         page.title("Files");
         for file in &content.files {
             page.paragraph(&path(file), Role::Plain);
@@ -130,7 +131,12 @@ fn corrected(content: &DeliverView, path: &dyn Fn(&str) -> String, page: &mut Pa
 }
 
 /// How to apply the result, pass it on and check it later, with commands to copy.
-fn next_steps(content: &DeliverView, path: &dyn Fn(&str) -> String, folder: &str, page: &mut Page) {
+fn next_steps(
+    content: &DeliverView,
+    path: &dyn Fn(&str) -> String,
+    (folder, from_root): (&str, &str),
+    page: &mut Page,
+) {
     page.title("What to do next");
     let calibration = path("calibration.ron");
     let is_accepted = content.verdict.as_ref().is_some_and(|verdict| verdict.status == VerdictStatus::Accepted);
@@ -151,7 +157,8 @@ fn next_steps(content: &DeliverView, path: &dyn Fn(&str) -> String, folder: &str
         page.marked(("- ", Role::Dim), wait, Role::Warn);
     }
     steps.push(("read the report here:", format!("trupose session report --text {folder}")));
-    steps.push(("or copy it from this computer to yours:", format!("scp THIS-COMPUTER:{} .", path("report.html"))));
+    // From another computer, a path without its beginning would be looked for at home.
+    steps.push(("or copy all files from this computer to yours:", format!("scp -r THIS-COMPUTER:{from_root} .")));
     steps.push((
         "verify with new points, later or after a collision:",
         format!("trupose verify --calibration {calibration} --measurements NEW.csv --refit frame+target"),

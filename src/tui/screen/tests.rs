@@ -45,6 +45,7 @@ fn view(step: Step, content: Content, offers: Vec<IntentInfo>) -> ViewModel {
     view.header.robot = Some(SOOCHOW.title().to_owned());
     view.header.session = Some("demo".to_owned());
     view.header.folder = Some("/home/op/sessions/demo".to_owned());
+    view.header.folder_from_root = view.header.folder.clone();
     view.content = content;
     view.intents = offers;
     view.intents.push(IntentInfo::new(Intent::Quit, "quit"));
