@@ -227,6 +227,7 @@ impl Driver<'_, '_> {
                 let Ok(shows_picture) = self.draw(&view) else { return End::Gone };
                 drawn = Some(now());
                 has_picture = shows_picture;
+                self.ui.note_picture(shows_picture);
                 changed = None;
                 (is_due, is_by_key) = (false, false);
             }

@@ -50,6 +50,10 @@ pub struct Ui {
     help: Option<usize>,
     camera: Camera,
     scene: Option<Scene>,
+    /// Whether the last frame showed the robot: keys that turn it have an effect.
+    has_picture: bool,
+    /// The last key, if it had no effect.
+    idle_key: Option<Key>,
     /// Whether local state changed since the last frame.
     is_dirty: bool,
     /// Whether the bell rings when something needs attention.
@@ -89,6 +93,8 @@ impl Ui {
             help: None,
             camera: Camera::default(),
             scene: None,
+            has_picture: true,
+            idle_key: None,
             is_dirty: true,
             has_bell: false,
             attention: None,
@@ -132,6 +138,11 @@ impl Ui {
         std::mem::take(&mut self.is_dirty)
     }
 
+    /// Takes note of whether the robot is in the frame that was drawn.
+    pub const fn note_picture(&mut self, has_picture: bool) {
+        self.has_picture = has_picture;
+    }
+
     pub fn on_input(&mut self, input: Input, view: &ViewModel) -> Command {
         let was_dirty = std::mem::replace(&mut self.is_dirty, true);
         let command = self.take_input(input, view);
@@ -163,6 +174,7 @@ impl Ui {
     }
 
     fn on_key(&mut self, key: Key, view: &ViewModel) -> Command {
+        let was_idle = self.idle_key.take().is_some();
         if let Some(dialog) = &mut self.dialog {
             if key == Key::ctrl('z') {
                 return Command::Suspend;
@@ -212,7 +224,10 @@ impl Ui {
                 Command::None
             }
             None => {
-                self.is_dirty = self.scene.is_some() && self.camera.on_key(key);
+                let turns_the_robot = self.has_picture && self.scene.is_some() && self.camera.on_key(key);
+                let is_letter = matches!(key.code, KeyCode::Char(_)) && !key.has_modifier();
+                self.idle_key = Some(key).filter(|_| is_letter && !turns_the_robot);
+                self.is_dirty = turns_the_robot || was_idle || self.idle_key.is_some();
                 Command::None
             }
         }
@@ -246,7 +261,14 @@ impl Ui {
             (None, Some(_)) => {
                 vec![KeyHint::new("any key", "back", 0), KeyHint::new("Up/Down", "scroll", 1)]
             }
-            (None, None) => self.page_key_hints(cx, area),
+            (None, None) => {
+                let mut items = self.page_key_hints(cx, area);
+                if let Some(key) = self.idle_key {
+                    let hint = KeyHint::new(key.name(self.theme.glyphs), "has no effect here", 0);
+                    items.insert(items.len().min(1), hint);
+                }
+                items
+            }
         }
     }
 

@@ -178,9 +178,9 @@ fn a_key_without_effect_hides_no_change() {
     // Both before it is drawn again.
     ui.on_input(Input::Key(Key::char('?')), &view);
     ui.on_input(Input::Key(Key::char('?')), &view);
-    ui.on_input(Input::Key(Key::char('@')), &view);
+    ui.on_input(Input::Key(Key::plain_code(KeyCode::F(9))), &view);
     assert!(ui.take_dirty());
-    ui.on_input(Input::Key(Key::char('@')), &view);
+    ui.on_input(Input::Key(Key::plain_code(KeyCode::F(9))), &view);
     assert!(!ui.take_dirty());
 }
 
@@ -194,6 +194,28 @@ fn the_robot_is_seen_where_there_is_room_and_nothing_before_it() {
     assert!(!ui.shows_picture(&view, Rect::new(0, 0, 20, 5)));
     ui.on_input(Input::Key(Key::char('?')), &view);
     assert!(!ui.shows_picture(&view, large));
+}
+
+#[test]
+fn a_letter_without_effect_is_answered_until_the_next_key() {
+    let view = screen::capture_tests::usual();
+    let mut ui = Ui::new(themes()[0]);
+    ui.refresh(&view, &Session::default());
+    ui.note_picture(false);
+    let footer = |ui: &mut Ui, key: Key| {
+        ui.take_dirty();
+        assert_eq!(ui.on_input(Input::Key(key), &view), Command::None);
+        let is_dirty = ui.take_dirty();
+        let mut buffer = Buffer::empty(Rect::new(0, 0, 80, 24));
+        ui.draw(&view, buffer.area, &mut buffer);
+        (is_dirty, paint::snapshot(&buffer))
+    };
+    for letter in ['z', 'j'] {
+        let (is_dirty, shown) = footer(&mut ui, Key::char(letter));
+        assert!(is_dirty && shown.contains(&format!("{letter} has no effect here")), "{shown}");
+    }
+    let (is_dirty, shown) = footer(&mut ui, Key::plain_code(KeyCode::F(9)));
+    assert!(is_dirty && !shown.contains("has no effect"), "{shown}");
 }
 
 /// The terminal's loop without a terminal.
