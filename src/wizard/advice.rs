@@ -11,8 +11,8 @@ pub(super) fn words(advice: Advice) -> String {
         Advice::VerifyPoints => "go back, plan some verification poses and measure them".to_owned(),
         Advice::PlanPoses => "go back, choose poses and measure them".to_owned(),
         Advice::CheckRows => "measure more poses".to_owned(),
-        Advice::StateSigma
-        | Advice::StateLimits
+        Advice::StateSigma => "state the accuracy of the instrument on the page of the cell".to_owned(),
+        Advice::StateLimits
         | Advice::NarrowRanges
         | Advice::OmitKind
         | Advice::CheckTable
