@@ -7,6 +7,7 @@ mod payload;
 mod profile;
 mod recording;
 mod session;
+mod shell;
 mod terminal;
 
 pub mod check;
@@ -41,6 +42,7 @@ use profile::NEW_EXAMPLES;
 pub use profile::NewProfileArgs;
 pub use recording::{RecordArgs, RecordCommand, RecordingArgs};
 pub use session::SessionCommand;
+pub use shell::{CompletionsArgs, ManArgs};
 pub use terminal::{ColorArg, TerminalArgs, TerminalEnvironment};
 
 /// The help of the program: commands by purpose, and examples.
@@ -257,6 +259,7 @@ pub enum Command {
     )]
     Verify(VerifyArgs),
     /// Identify from direct distances: shared points (ball and sockets) or measured lengths, no coordinates
+    #[command(after_help = "Example:\n  trupose constraints --profile ur10e --measurements sockets.csv --out results")]
     Constraints(ConstraintsArgs),
     /// Plan which poses to measure, and in which order
     #[command(after_help = "Example:\n  trupose plan --profile ur10e --poses 60 --out plan.csv")]
@@ -267,10 +270,16 @@ pub enum Command {
     )]
     Program(ProgramArgs),
     /// Test the arm with the definitions of ISO 9283: plan the poses, evaluate the points
-    #[command(subcommand)]
+    #[command(
+        subcommand,
+        after_help = "Example:\n  trupose iso9283 plan --profile ur10e --out cube.csv\n  trupose iso9283 evaluate --profile ur10e --measurements attained.csv"
+    )]
     Iso9283(iso9283::Iso9283Command),
     /// Check with a few poses whether a calibration still holds: plan the poses, evaluate the points
-    #[command(subcommand)]
+    #[command(
+        subcommand,
+        after_help = "Example:\n  trupose check plan --calibration calibration.ron --out check.csv\n  trupose check evaluate --calibration calibration.ron --measurements checked.csv"
+    )]
     Check(check::CheckCommand),
     /// Compare calibrations of one arm, or of sister arms: what has changed, over the workspace
     #[command(after_help = "Example:\n  trupose compare 2025/calibration.ron 2026/calibration.ron")]
@@ -281,9 +290,10 @@ pub enum Command {
     )]
     Compensate(compensate::CompensateArgs),
     /// Write the identified arm as a profile, URDF or table
-    #[command(after_help = "Example:\n  trupose export --calibration calibration.ron --format dh-csv")]
+    #[command(after_help = "Example:\n  trupose export --calibration calibration.ron --format dh-csv --out dh.csv")]
     Export(compensate::ExportArgs),
     /// Guided calibration in the terminal; the same as no command at all
+    #[command(after_help = "Example:\n  trupose wizard --profile ur10e\n  trupose wizard --plain")]
     Wizard(WizardArgs),
     /// Calibrate a simulated robot from profile to result, without a terminal
     #[command(after_help = "Example:\n  trupose demo --seed 7")]
@@ -295,39 +305,34 @@ pub enum Command {
     #[command(after_help = "Example:\n  trupose replay sessions/ur10e-20260301-0915")]
     Replay(ReplayArgs),
     /// List, show or export sessions
-    #[command(subcommand)]
+    #[command(
+        subcommand,
+        after_help = "Example:\n  trupose session list\n  trupose session report --text sessions/ur10e-20260301"
+    )]
     Session(SessionCommand),
     /// Make recordings for the 3D viewer again
-    #[command(subcommand)]
+    #[command(subcommand, after_help = "Example:\n  trupose record rebuild sessions/ur10e-20260301")]
     Record(RecordCommand),
     /// List, show, write or check robot profiles
-    #[command(subcommand)]
+    #[command(
+        subcommand,
+        after_help = "Example:\n  trupose profile show ur10e\n  trupose profile new --from ur10e --out my-arm.ron"
+    )]
     Profile(ProfileCommand),
     /// Test the link to an instrument
-    #[command(subcommand)]
+    #[command(subcommand, after_help = "Example:\n  trupose link test emscon:192.168.0.2")]
     Link(LinkCommand),
     /// Simulate an instrument or a robot's controller on a wire
+    #[command(
+        after_help = "Example:\n  trupose simulate emscon --profile ur10e --plan plan.csv --listen 127.0.0.1:7000"
+    )]
     Simulate(SimulateArgs),
     /// Print the completions of a shell
+    #[command(after_help = "Example:\n  trupose completions bash")]
     Completions(CompletionsArgs),
     /// Print the manual page, or write the pages of all commands
+    #[command(after_help = "Example:\n  trupose man --out man1")]
     Man(ManArgs),
-}
-
-/// Arguments of `completions`.
-#[derive(Args, Clone, Copy, Debug)]
-pub struct CompletionsArgs {
-    /// Shell to complete commands and options for
-    #[arg(value_enum)]
-    pub shell: clap_complete::Shell,
-}
-
-/// Arguments of `man`.
-#[derive(Args, Clone, Debug)]
-pub struct ManArgs {
-    /// Folder for the pages of all commands; created if it is missing
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
 }
 
 /// Commands about profiles.
@@ -405,15 +410,12 @@ pub struct EstimationArgs {
 /// Arguments of `identify`.
 #[derive(Args, Debug)]
 pub struct IdentifyArgs {
-    /// Options of recordings.
-    #[command(flatten)]
-    pub record: RecordArgs,
-    /// Options of the identification.
-    #[command(flatten)]
-    pub estimation: EstimationArgs,
     /// Measured points: CSV with units in the column names
     #[arg(long, value_name = "CSV")]
     pub measurements: PathBuf,
+    /// Options of the identification.
+    #[command(flatten)]
+    pub estimation: EstimationArgs,
     /// Layout of the tables: 'named', 'robodk', 'delmia', or one that 'import' saved
     #[arg(long, value_name = "NAME", default_value = "named")]
     pub layout: String,
@@ -435,6 +437,9 @@ pub struct IdentifyArgs {
     /// How far every length and every angle may have drifted since, such as '0.01mm,0.001deg' [default: 0.002mm,0.0002deg]
     #[arg(long, value_name = "LENGTH,ANGLE", requires = "from_calibration")]
     pub drift: Option<ExpectedDeviation>,
+    /// Options of recordings.
+    #[command(flatten)]
+    pub record: RecordArgs,
 }
 
 /// Arguments of `verify`.
@@ -469,12 +474,12 @@ pub struct VerifyArgs {
 /// Arguments of `constraints`.
 #[derive(Args, Debug)]
 pub struct ConstraintsArgs {
-    /// Options of the identification.
-    #[command(flatten)]
-    pub estimation: EstimationArgs,
     /// Shared points (position, socket, joints), lengths (from_q1_deg …, to_q1_deg …, length_mm) or contacts (feature, shape, joints, length_mm): CSV with units
     #[arg(long, value_name = "CSV")]
     pub measurements: PathBuf,
+    /// Options of the identification.
+    #[command(flatten)]
+    pub estimation: EstimationArgs,
     /// Known distance between the two sockets of one position
     #[arg(long, value_name = "MM", value_parser = positive)]
     pub socket_distance_mm: Option<f64>,

@@ -51,10 +51,37 @@ fn the_overview_has_every_command_once() {
 
 #[test]
 fn options_are_in_the_order_of_use() {
-    let command = Cli::command();
-    let plan = command.find_subcommand("plan").unwrap();
-    let options: Vec<&str> = plan.get_arguments().map(|argument| argument.get_id().as_str()).take(4).collect();
-    assert_eq!(options, ["profile", "poses", "verification", "out"]);
+    let first = |name: &str, count: usize| {
+        let mut command = Cli::command();
+        command.build();
+        let help = command.find_subcommand_mut(name).unwrap().render_long_help().to_string();
+        let options = help.lines().filter_map(|line| line.trim_start().strip_prefix("--"));
+        let names = options.filter_map(|line| line.split_whitespace().next()).map(str::to_owned);
+        names.take(count).collect::<Vec<_>>()
+    };
+    assert_eq!(first("plan", 4), ["profile", "poses", "verification", "out"]);
+    assert_eq!(first("identify", 2), ["measurements", "profile"]);
+    assert_eq!(first("constraints", 2), ["measurements", "profile"]);
+}
+
+#[test]
+fn every_command_has_examples_that_are_understood() {
+    for command in Cli::command().get_subcommands() {
+        let name = command.get_name();
+        // Those of 'profile new' and the like are with the command below.
+        let examples = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+        let lines: Vec<&str> = examples
+            .lines()
+            .map(str::trim)
+            .filter(|line| line.starts_with("trupose ") && !line.contains('\''))
+            .collect();
+        assert!(!lines.is_empty(), "{name}");
+        for line in lines {
+            assert!(line.starts_with(&format!("trupose {name}")), "{name}: {line}");
+            let understood = Cli::try_parse_from(line.split_whitespace());
+            assert!(understood.is_ok(), "{line}: {}", understood.unwrap_err());
+        }
+    }
 }
 
 #[test]
