@@ -50,8 +50,7 @@ pub struct Ui {
     help: Option<usize>,
     camera: Camera,
     scene: Option<Scene>,
-    /// Whether the last frame showed the robot: keys that turn it have an effect.
-    has_picture: bool,
+    last_frame: LastFrame,
     /// The last key, if it had no effect.
     idle_key: Option<Key>,
     /// Whether local state changed since the last frame.
@@ -62,6 +61,13 @@ pub struct Ui {
     attention: Option<Attention>,
     /// Whether the bell has to ring.
     is_ringing: bool,
+}
+
+/// Whether the last frame showed the robot: only then keys turn it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum LastFrame {
+    WithRobot,
+    WithoutRobot,
 }
 
 /// An event of the capture step that an operator who is not looking at the screen should not miss.
@@ -93,7 +99,7 @@ impl Ui {
             help: None,
             camera: Camera::default(),
             scene: None,
-            has_picture: true,
+            last_frame: LastFrame::WithRobot,
             idle_key: None,
             is_dirty: true,
             has_bell: false,
@@ -140,7 +146,7 @@ impl Ui {
 
     /// Takes note of whether the robot is in the frame that was drawn.
     pub const fn note_picture(&mut self, has_picture: bool) {
-        self.has_picture = has_picture;
+        self.last_frame = if has_picture { LastFrame::WithRobot } else { LastFrame::WithoutRobot };
     }
 
     pub fn on_input(&mut self, input: Input, view: &ViewModel) -> Command {
@@ -224,7 +230,8 @@ impl Ui {
                 Command::None
             }
             None => {
-                let turns_the_robot = self.has_picture && self.scene.is_some() && self.camera.on_key(key);
+                let is_shown = self.last_frame == LastFrame::WithRobot && self.scene.is_some();
+                let turns_the_robot = is_shown && self.camera.on_key(key);
                 let is_letter = matches!(key.code, KeyCode::Char(_)) && !key.has_modifier();
                 self.idle_key = Some(key).filter(|_| is_letter && !turns_the_robot);
                 self.is_dirty = turns_the_robot || was_idle || self.idle_key.is_some();
