@@ -9,8 +9,12 @@ use rand_chacha::ChaCha8Rng;
 use trupose::planning::candidates::CandidateFilter;
 use trupose::planning::collision::DEFAULT_CLEARANCE;
 use trupose::planning::order::{Pace, Stops, home_pose, order};
-use trupose::planning::{Body, Cell, MountedTarget, TrackerStand, verification_set};
+use trupose::planning::{Cell, verification_set};
 use trupose::profile::{Profile, builtin};
+
+#[path = "../tests/support/cell_of.rs"]
+mod cell_of;
+use cell_of::cell;
 
 fn main() {
     divan::main();
@@ -18,25 +22,6 @@ fn main() {
 
 fn profile() -> Profile {
     Profile::parse(builtin("soochow").unwrap(), "soochow").unwrap().0
-}
-
-fn cell(profile: &Profile) -> Cell {
-    let (target, tracker) = (&profile.targets()[0], profile.tracker());
-    let body =
-        |body: &trupose::profile::Capsule| Body { link: body.link, from: body.from, to: body.to, radius: body.radius };
-    Cell {
-        limits: profile.joints().iter().map(|joint| joint.planning_limits.unwrap()).collect(),
-        bodies: profile.bodies().iter().map(body).collect(),
-        floor: profile.floor(),
-        keep_out: Vec::new(),
-        tracker: Some(TrackerStand {
-            position_in_base: tracker.position_in_base,
-            acceptance_angle: tracker.acceptance_angle,
-            range: tracker.range,
-        }),
-        target: MountedTarget { position_in_flange: target.position_in_flange, axis_in_flange: target.axis_in_flange },
-        region: None,
-    }
 }
 
 fn configurations(cell: &Cell, count: usize) -> Vec<Vec<f64>> {

@@ -1,6 +1,7 @@
 //! Shipped profiles in their cells: what passes the filters and the ordering also passes an independent check, which knows
 //! capsules only as sampled points.
 
+use crate::support::cell_of::cell;
 use crate::support::point_cloud::{PointCloud, SPACING};
 use nalgebra::Point3;
 use rand::{RngExt as _, SeedableRng as _};
@@ -8,37 +9,11 @@ use rand_chacha::ChaCha8Rng;
 use trupose::planning::candidates::{CandidateFilter, Candidates, Rule, on_grid};
 use trupose::planning::collision::{ArmShape, DEFAULT_CLEARANCE, Obstruction, Part};
 use trupose::planning::order::{OrderError, Pace, Route, StepKind, Stops, home_pose, order};
-use trupose::planning::{Body, BoxInBase, Cell, CellError, KeepOutBox, MountedTarget, TrackerStand, verification_set};
+use trupose::planning::{BoxInBase, Cell, CellError, KeepOutBox, TrackerStand, verification_set};
 use trupose::profile::{Profile, builtin, builtin_names};
 
 fn profile(name: &str) -> Profile {
     Profile::parse(builtin(name).unwrap(), name).unwrap_or_else(|errors| panic!("{errors}")).0
-}
-
-fn cell(profile: &Profile) -> Cell {
-    let target = &profile.targets()[0];
-    let tracker = profile.tracker();
-    Cell {
-        limits: profile.joints().iter().map(|joint| joint.planning_limits.unwrap()).collect(),
-        bodies: profile
-            .bodies()
-            .iter()
-            .map(|body| Body { link: body.link, from: body.from, to: body.to, radius: body.radius })
-            .collect(),
-        floor: profile.floor(),
-        keep_out: profile
-            .keep_out()
-            .iter()
-            .map(|zone| KeepOutBox { name: zone.name.clone(), space: BoxInBase { min: zone.min, max: zone.max } })
-            .collect(),
-        tracker: Some(TrackerStand {
-            position_in_base: tracker.position_in_base,
-            acceptance_angle: tracker.acceptance_angle,
-            range: tracker.range,
-        }),
-        target: MountedTarget { position_in_flange: target.position_in_flange, axis_in_flange: target.axis_in_flange },
-        region: None,
-    }
 }
 
 fn pace(profile: &Profile) -> Pace {
