@@ -140,6 +140,21 @@ fn columns_are_taken_as_a_person_names_them() {
 }
 
 /// What a refused table proposes reads it, once a person has confirmed it.
+/// Pasted back, it would read counts of an encoder as angles.
+#[test]
+fn joints_in_another_unit_get_no_proposal() {
+    for name in ["q#_pulse", "J# [pulse]", "A#_cnt", "axis # (counts)"] {
+        let names: Vec<String> = (1..=3).map(|joint| name.replace('#', &joint.to_string())).collect();
+        let text = format!("{},x_mm,y_mm,z_mm\n137112,43846,-7934,1,2,3\n82174,28755,42835,2,3,4\n", names.join(","));
+        let errors = read(&text, &Reading::default()).unwrap_err();
+        assert_eq!(
+            errors.understood.as_ref().and_then(|understood| understood.proposal.clone()),
+            None,
+            "{name}: {errors}"
+        );
+    }
+}
+
 #[test]
 fn a_proposal_can_be_pasted_back() {
     for text in [

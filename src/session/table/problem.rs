@@ -171,7 +171,7 @@ pub enum Defect {
     },
     /// A name that ends with something that is not a unit of its quantity.
     #[error(
-        "'{unit}' is not a unit for this column; write {}, or another name if it is something else",
+        "'{unit}' is not a unit for this column; convert its values to {}, or give it another name if it is something else",
         any_of(allowed)
     )]
     UnknownUnit {

@@ -11,6 +11,9 @@ const LARGEST_RADIAN: f64 = 7.0;
 const LARGEST_METRE: f64 = 20.0;
 /// Rows whose numbers are looked at.
 const LOOKED_AT: usize = 200;
+/// Words in names of columns with readings of encoders.
+const COUNTS: &[&str] =
+    &["pulse", "pulses", "count", "counts", "cnt", "tick", "ticks", "inc", "increment", "increments", "step", "steps"];
 
 impl Study<'_> {
     /// Proposes what the columns with names may be.
@@ -23,6 +26,9 @@ impl Study<'_> {
         }
         if wanted != Wanted::Points {
             let Some(joints) = joints else { return };
+            if joints.iter().any(|column| self.has_other_unit(*column)) {
+                return;
+            }
             for (index, (column, joint)) in joints.into_iter().zip(self.expected.joints).enumerate() {
                 let unit = self.stated(column).unwrap_or_else(|| self.guessed_unit(&[column], *joint));
                 mapped.push((format!("q{}_{unit}", index + 1), self.source(column)));
@@ -140,6 +146,19 @@ impl Study<'_> {
     fn stated(&self, index: usize) -> Option<&'static str> {
         let name = self.parsed.get(index)?;
         name.unit.or_else(|| self.unit_row.get(index).copied().flatten())
+    }
+
+    /// Whether the name of a column states a unit that joints cannot have: its numbers must not be taken for angles.
+    fn has_other_unit(&self, index: usize) -> bool {
+        if self.stated(index).is_some() {
+            return false;
+        }
+        let name = self.shown.get(index).map(|name| name.to_lowercase()).unwrap_or_default();
+        let counts = name.split(|c: char| !c.is_alphanumeric()).any(|word| COUNTS.contains(&word));
+        let of_our_names = name.split_once('_').filter(|(base, unit)| {
+            base.strip_prefix('q').is_some_and(|number| number.parse::<usize>().is_ok()) && !unit.is_empty()
+        });
+        counts || of_our_names.is_some()
     }
 
     fn source(&self, index: usize) -> Source {
